@@ -50,7 +50,7 @@ class LinkRefused(LinkError):
 
 
 class LinkTimeout(LinkError):
-    """No answer in time."""
+    """No answer arrived in time."""
 
 
 class BadFrame(LinkError):

@@ -16,7 +16,7 @@ OUTSIDE_POSITION = "Ask for positions within the limits; an oscillation goes hal
 
 @dataclass(frozen=True)
 class Identity:
-    """Who answered. A field is empty where the instrument has no register for it."""
+    """Identity of the instrument that answered. A field is empty where the instrument has no register for it."""
 
     model: str
     serial: str = ""

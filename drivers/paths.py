@@ -38,7 +38,7 @@ class TurnPath:
 
     @property
     def ends_deg(self) -> tuple[float, float]:
-        """Where run-up begins and braking ends."""
+        """The angles at which run-up begins and braking ends."""
         speed, sense = abs(self.rate_deg_s), math.copysign(1.0, self.last_deg - self.first_deg)
         ramp_deg = speed**2 / (2 * self.acceleration_deg_s2)
         return self.first_deg - sense * (ramp_deg + LEAD_S * speed), self.last_deg + sense * (TAIL_S * speed + ramp_deg)

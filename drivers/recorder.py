@@ -75,11 +75,11 @@ class NoDigitalLines:
 
     @property
     def power_dio(self) -> None:
-        """No line switches the sensor's power."""
+        """None: no line switches the sensor's power."""
 
     @property
     def interlocks(self) -> Mapping[str, int]:
-        """It has no contacts."""
+        """Empty: the instrument has no contacts."""
         return {}
 
 
@@ -133,7 +133,7 @@ class Recorder(Generic[Settings]):
         return samples
 
     def acquire_with(self, duration_s: float, reading: Callable[[], Read]) -> tuple[Samples, Read]:
-        """As `acquire`, with the result of `reading`, which is called in the middle of the record."""
+        """Acquire samples, and call `reading` in the middle of the record; return both results."""
         with contextlib.closing(self.stream(duration_s, duration_s / 2)) as stream:
             blocks = [next(stream)]
             value = reading()
@@ -141,7 +141,7 @@ class Recorder(Generic[Settings]):
         return _join(blocks), value
 
     def acquire_watched(self, duration_s: float, watch: Callable[[], object], every_s: float) -> Samples:
-        """The same as `acquire`; `watch` is called about every `every_s`, and at the end. Its error ends the record."""
+        """Acquire samples; call `watch` about every `every_s` and at the end. An error of `watch` ends the record."""
         blocks = []
         with contextlib.closing(self.stream(duration_s, every_s)) as stream:
             for block in stream:

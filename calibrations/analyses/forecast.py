@@ -248,7 +248,7 @@ def soak_parts(table: Table) -> Iterator[Table]:
 
 
 def _time_to_tolerance_s(remaining: Array, taus_s: Array, tolerance: float) -> Array:
-    """For each draw, the time until the remaining drift is within the tolerance; `remaining` and `taus_s` (n, 2)."""
+    """For each draw, the time after which the remaining drift stays within the tolerance; inputs have shape (n, 2)."""
     future_drift = np.abs(
         np.sum(remaining[:, None, :] * np.exp(-HORIZON_S[None, :, None] / taus_s[:, None, :]), axis=2)
     )

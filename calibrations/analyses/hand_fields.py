@@ -45,7 +45,7 @@ class FieldCourse(Course):
 
     @property
     def north(self) -> tuple[float, ...]:
-        """Its direction to the north."""
+        """The position's direction to the north."""
         return tuple(map(float, self.next.attitude.north))
 
     @property

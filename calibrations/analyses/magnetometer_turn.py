@@ -120,7 +120,7 @@ class ExtremesEstimate:
 
 
 def field_elements(sensed: Array, sensor_from_base: Array, turns: Sequence[str]) -> Elements:
-    """From a calibrated field (n, 3) at known attitudes (n, 3, 3); `turns` names the turn of each row."""
+    """Elements of a calibrated field (n, 3) at known attitudes (n, 3, 3); `turns` names the turn of each row."""
     in_base = np.einsum("nij,ni->nj", sensor_from_base, sensed)
     names = np.array(turns)
     means = np.array([in_base[names == turn].mean(axis=0) for turn in dict.fromkeys(turns)])
@@ -159,7 +159,7 @@ def level_elements_by_extremes(outputs: Array, sensor_from_base: Array, turn_std
 
 
 def iron_by_extremes(outputs: Array, edges: Sequence[str], turns: Sequence[str], std: float) -> ExtremesEstimate:
-    """From raw outputs (n, 3) of turns about the edge of each row, `std` that of one of them; z first.
+    """Estimate the iron from extreme outputs (n, 3) of turns about each row's edge, z first; `std` is that of one.
 
     Two turns about an edge are one and one turned over.
     """
@@ -197,7 +197,7 @@ def horizontal_per_mille(xy: Array) -> float:
 
 
 def _remaining_per_mille(outputs: Array, middle: Array, round_z: Ellipse, about_z: Array) -> float:
-    """Of the whole sphere if the hard iron of every axis is known, otherwise of the turn about z."""
+    """Remaining variation, per mille: of the whole sphere if all hard iron is known, otherwise of the turn about z."""
     if not np.isfinite(middle).all():
         return horizontal_per_mille((about_z - estimate_hard_iron(about_z)) @ round_z.correction)
     centred = outputs - middle

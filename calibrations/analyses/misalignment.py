@@ -95,7 +95,7 @@ class Direction:
 
 
 def estimate_directions(table: Table) -> dict[str, Direction]:
-    """Of x and of y, from the rounds about the last centre. Raises DataError where no round is complete."""
+    """Directions of x and of y, from the rounds about the last centre. Raises DataError where no round is complete."""
     number = np.array([_number(path) for path in table.labels.get("path", ())])
     if len(number) != table.n or not table.n:
         raise DataError(

@@ -92,7 +92,7 @@ def measured_acceleration(part: Table, record: Record, model: Model, band: Respo
 
 
 def inverse_response(table: Table, model: Model, axis: int, band: Response) -> Response:
-    """From samples to the transducer's output in the band: without the output filter and the skew.
+    """Invert the response in the band, from samples to the transducer's output: removes the output filter and the skew.
 
     A corner and a delay that the model holds take the place of the nominal ones.
     """

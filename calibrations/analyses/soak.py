@@ -219,7 +219,7 @@ class Course:
 
     @property
     def time_s(self) -> Quantity | None:
-        """Its steady-state time since power-on; None where it is not reached or not known."""
+        """The steady-state time since power-on; None where it is not reached or not known."""
         return self.state.time_s if self.state else None
 
 

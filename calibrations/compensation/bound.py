@@ -75,7 +75,7 @@ class Interval:
 
     @property
     def zero(self) -> Flags:
-        """Where the interval is exactly 0."""
+        """Flags of the points where the interval is exactly 0."""
         return np.asarray((self.low == 0) & (self.high == 0))
 
     def monotone(self, name: str) -> Interval:

@@ -41,7 +41,7 @@ Stds = Callable[[Inputs], Array]
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Of the worst axis: rms and maximum with inputs `within` the calibrated ranges; `largest` of all, at `at`."""
+    """The worst axis: rms and maximum with inputs `within` the calibrated ranges; `largest` of all inputs, at `at`."""
 
     within: Mapping[str, Span]
     rms: float
@@ -53,7 +53,7 @@ class Uncertainty:
 def result_uncertainty(
     model: Model, forward: Forward, table: Table, a: Array, spans: Mapping[str, Span], reach: float
 ) -> Uncertainty | None:
-    """By the standard uncertainties of the parameters and their correlations; None without any.
+    """Uncertainty from the parameters' standard uncertainties and correlations; None if the model has none.
 
     For the specific force `a` (n, 3) of the rows of `table`, and for `a` scaled to `reach` on its largest axis; `spans`
     has the stated range of each input besides the outputs. Source  GUM 5.2.2.
@@ -247,7 +247,7 @@ class _Trial:
     memory: Mapping[str, Array]
 
     def inputs(self, steps: Sequence[Step]) -> dict[str, Array]:
-        """Of the program, for a sensor of these steps."""
+        """Inputs of the program, for a sensor with these steps."""
         v = respond(sensed(self.a, self.table, steps), self.table, steps)
         by_name = {f"v{axis}": v[:, k] for k, axis in enumerate("xyz")}
         by_name |= {name: self.a[:, k] for k, name in enumerate(FORCES)}
@@ -299,7 +299,7 @@ def _size(errors: Array) -> ErrorSize:
 
 
 def _error_of_excluded_effect(name: str, model: Model, followed: Sequence[Step], trial: _Trial) -> ErrorSize | None:
-    """By the whole model with this effect, compensated without it."""
+    """Error that remains if the model has this effect and the compensation leaves it out."""
     steps = [s for s in steps_of(model) if s[0].name == name or any(s[0] is step[0] for step in followed)]
     try:
         inputs = trial.inputs(steps)

@@ -78,7 +78,7 @@ class Table(Protocol):
 
     @property
     def low(self) -> float:
-        """Where the first piece begins."""
+        """The lower end of the first piece."""
 
     @property
     def step(self) -> float:

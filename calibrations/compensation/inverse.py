@@ -174,12 +174,12 @@ class Residual:
 
     @property
     def rmse(self) -> Mapping[str, tuple[float, float]]:
-        """By axis: linear, compensated, mm/s^2."""
+        """RMS error, mm/s^2, of each axis: with the linear model, and compensated."""
         errors = zip(self.axes, rms(self.linear.T), rms(self.compensated.T), strict=True)
         return {axis: (float(a), float(b)) for axis, a, b in errors}
 
     def lines(self) -> list[str]:
-        """For people."""
+        """The result as lines of text."""
         return [
             f"{axis}: rms error {rounded(rms_linear)} mm/s² by the linear model, {rounded(rms_compensated)} mm/s² "
             f"compensated, {100 * (1 - rms_compensated / rms_linear):.1f} % less, "
@@ -188,7 +188,7 @@ class Residual:
         ]
 
     def document(self) -> dict[str, Any]:
-        """As JSON."""
+        """The result as a JSON document."""
         rmse = {
             axis: {"linear": rms_linear, "compensated": rms_compensated}
             for axis, (rms_linear, rms_compensated) in self.rmse.items()

@@ -110,7 +110,7 @@ def trace_free_form(effect: FreeForm, a: NodeArray, v: NodeArray, table: RunTime
 
 
 def _part(form: Form, u: Array, a: Sequence[Node], v: Node, table: RunTime, k: int) -> Node:
-    """One form at axis k, with its coefficients u."""
+    """The value of one form at axis k, with its coefficients u."""
     basis = form.basis(k)
     if isinstance(basis, Products):
         products = [prod(map(power, a, powers), start=ONE) for powers in basis.powers]

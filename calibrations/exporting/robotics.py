@@ -84,5 +84,5 @@ def _row(values: Array) -> str:
 
 
 def _number(value: float) -> str:
-    """With a point, because YAML readers take 4e-6 for a text."""
+    """The number with a decimal point: YAML readers take 4e-6 for text."""
     return f"{value:.12e}"

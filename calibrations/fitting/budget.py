@@ -105,7 +105,7 @@ def make_budget(fit: Fit, inputs: Iterable[Contribution]) -> Budget:
 
 
 def row_gains(fit: Fit) -> Array:
-    """How far each error of a row moves each parameter, shape (p, channels, n)."""
+    """Derivative of each parameter with respect to the error of each row, shape (p, channels, n)."""
     channels, n = fit.residual.shape
     rows = np.vstack([fit.whitened[:, 1:], fit.problem.layout.prior_rows])
     inverse = gain(rows, fit.problem.layout.typical)[:, : channels * n].reshape(-1, channels, n)
@@ -136,7 +136,7 @@ def _of_type_a(fit: Fit, G: Array, square: float) -> list[Line]:
 
 
 def _of_type_b(fit: Fit, G: Array, c: Contribution) -> tuple[Line, float]:
-    """One input that is not fitted, and the sum of squares that its errors leave in the residual."""
+    """The line of an input that is not fitted, and the sum of squares that its errors leave in the residual."""
     if c.std is None:
         return Line(c.source, "B", c.unit, None, None, None, c.freedom), 0.0
     row_errors, number = _errors_of_rows(fit, c), c.shared(fit.table)
@@ -155,7 +155,7 @@ def input_effects(fit: Fit, G: Array, c: Contribution) -> Array:
 
 
 def _errors_of_rows(fit: Fit, c: Contribution) -> Array:
-    """Which error of the rows looks like one of an input, shape (channels, n).
+    """Errors of the rows that have the same effect as a unit error of the input, shape (channels, n).
 
     The residual is measured less predicted: a parameter follows an input against what the residual does.
     """

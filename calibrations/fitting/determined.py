@@ -64,7 +64,7 @@ def explain_undetermined(fit: Fit) -> str | None:
 
 
 def _warn_of_unchecked_rows(fit: Fit, lone: NDArray[np.bool_]) -> str:
-    """That some rows, `lone` in shape (channels, n), have parameters to themselves."""
+    """Warn that some rows, `lone` in shape (channels, n), determine a parameter alone."""
     rows = np.flatnonzero(lone.any(axis=0))
     paths = fit.table.labels.get("path")
     labels = [paths[k] for k in rows] if paths else [f"row {number}" for number in fit.table.numbered(rows)]

@@ -146,7 +146,7 @@ def _unresolved_error(problem: Problem, theta: Array) -> ModelError:
 
 
 def _alternate_unchecked(problem: Problem, noise: Noise, starts: list[Array]) -> Fit:
-    """As `_alternate`; raises LinAlgError."""
+    """Do the work of `_alternate`; raises LinAlgError."""
     theta = min((minimise(problem, noise, start) for start in starts), key=lambda t: t[1])[0]
     # with smooth columns set aside the noise hardly depends on the parameters, and one round is enough
     for _ in range(1 if problem.smooth.size else ROUNDS):

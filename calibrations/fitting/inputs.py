@@ -49,7 +49,7 @@ class Contribution:
 
 
 def one_error(table: Table) -> NDArray[np.intp]:
-    """One error for the whole table."""
+    """Indices of the errors: one error is common to the whole table."""
     return np.zeros(table.n, dtype=np.intp)
 
 
@@ -59,7 +59,7 @@ def error_per_row(table: Table) -> NDArray[np.intp]:
 
 
 def error_per_angle(name: str) -> Sharing:
-    """One error for all rows at the same angle."""
+    """Indices of the errors: rows at the same angle share one error."""
 
     def number(table: Table) -> NDArray[np.intp]:
         angle_deg = np.round(np.mod(table.column(name), 360), 6)
@@ -69,7 +69,7 @@ def error_per_angle(name: str) -> Sharing:
 
 
 def column_derivative(name: str, step: float) -> Derivative:
-    """With respect to a column of the table, by central differences."""
+    """Derivative with respect to a column of the table, by central differences."""
 
     def derivative(problem: Problem, theta: Array) -> Array:
         forward, backward = (_shift_input(problem, name, change).residual(theta) for change in (step, -step))
@@ -79,7 +79,7 @@ def column_derivative(name: str, step: float) -> Derivative:
 
 
 def step_derivative(effect: Effect, step: float) -> Derivative:
-    """With respect to what `effect` takes as "by", at zero."""
+    """Derivative with respect to the parameter "by" of `effect`, at zero."""
 
     def derivative(problem: Problem, theta: Array) -> Array:
         steps = problem.layout.steps(theta)
@@ -130,7 +130,7 @@ def _of_the_mount() -> list[tuple[str, Contribution]]:
 
 
 def _rate_derivative(problem: Problem, theta: Array) -> Array:
-    """With respect to the share by which the stage turns faster than it reports."""
+    """Derivative with respect to the relative error of the stage's reported rate."""
     share = 1e-4
     change = share * problem.table.column("rate_deg_s")
     forward, backward = (_shift_input(problem, "rate_deg_s", by).residual(theta) for by in (change, -change))

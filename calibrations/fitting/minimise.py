@@ -61,7 +61,7 @@ def minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float
 
 
 def _at_once(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float] | None:
-    """As `minimise`, where one step of Gauss and Newton's gets there: the model is linear. None where it is not.
+    """Minimise in one Gauss-Newton step, which suffices for a linear model. None if the model is not linear.
 
     A time constant changes nothing while its amplitude is 0. A step that changes the amplitude leaves it to be fitted.
     """
@@ -87,7 +87,7 @@ def _at_once(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float
 
 
 def _minimise_determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float]:
-    """As `minimise`, by the shortest steps of Gauss and Newton, damped where they fail (Levenberg and Marquardt).
+    """Minimise by the shortest Gauss-Newton steps, damped where they fail (Levenberg and Marquardt).
 
     What the data do not determine stays as it began.
     """

@@ -171,7 +171,7 @@ class NoiseSearch:
 
     @cached_property
     def grams(self) -> list[Grams]:
-        """Per channel, over the grid."""
+        """Gram matrices of each channel, over the grid."""
         basis, _ = self.further_columns
         smooth = np.broadcast_to(self.smooth, (len(basis), *self.smooth.shape))
         columns = np.concatenate([smooth, basis, self.residual[:, :, None]], axis=2)
@@ -188,7 +188,7 @@ class NoiseSearch:
 
     @cached_property
     def _flickers(self) -> NDArray[np.bool_]:
-        """Which points of the grid are flicker noise, or none."""
+        """Flags of the grid points that are flicker noise or no slow noise."""
         return np.array([len(taus) > 1 or ratio == 0 for ratio, taus in self.grid])
 
     def _choose(self, score: Array) -> int:
@@ -253,7 +253,7 @@ class Grams:
     information: Array  # log det S^T Sigma^-1 S of the smooth columns, (grid,)
 
     def of(self, columns: NDArray[np.intp]) -> Grams:
-        """The same with some of the columns, and the residual."""
+        """Gram matrices of some of the columns, and of the residual."""
         keep = np.append(columns, self.gram.shape[1] - 1)
         return replace(self, gram=np.ascontiguousarray(self.gram[:, keep[:, None], keep]))
 

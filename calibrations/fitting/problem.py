@@ -34,7 +34,7 @@ class Problem:
     averages: ClassVar[bool] = True  # whether uncertainties are averaged over the slow noise that the data allow
 
     def on(self, table: Table) -> Problem:
-        """The same model on another table of this kind."""
+        """The problem of the same model on another table of this kind."""
         return replace(self, table=table)
 
     @staticmethod
@@ -68,7 +68,7 @@ class Problem:
         return self.residual_by(self.layout.steps(theta))
 
     def residual_by(self, steps: Sequence[Step]) -> Array:
-        """As `residual`, from effects with their values: those of the model, or others."""
+        """The residual for effects that have their values: those of the model, or others."""
         return self._reduced(self.samples.outputs - forward(self.samples, steps))
 
     @property
@@ -165,7 +165,7 @@ class Problem:
         return scatter(self.table) if std is None else self._white(std)
 
     def _white(self, std: Array) -> Array:
-        """As `white`, from the standard deviations of the outputs' means, shape (n, axes)."""
+        """White noise of the residual, from the standard deviations of the outputs' means, shape (n, axes)."""
         return std.T
 
     @property

@@ -77,16 +77,16 @@ class PositionProblem(Problem):
         return error.T
 
     def sensed(self, theta: Array) -> Array:
-        """As the model has it from the outputs."""
+        """The sensed quantity that the model computes from the outputs."""
         steps = self.layout.steps(theta)
         return sensed(backward(self.table, steps), self.table, steps)
 
     def _chain_at(self, steps: Sequence[Step]) -> LinearisedChain:
-        """From the outputs back to the sensed quantity."""
+        """The linearised inverse of the chain: from the outputs to the sensed quantity."""
         return LinearisedChain(self.table, steps, backward(self.table, steps))
 
     def of_output(self, theta: Array, changes: Array) -> Array:
-        """By how the magnitude follows each output."""
+        """Derivative of the magnitude with respect to each output."""
         return self._of_output(self._chain_at(self.layout.steps(theta)), changes)
 
     def _of_output(self, chain: LinearisedChain, changes: Array) -> Array:
@@ -119,7 +119,7 @@ class FieldProblem(PositionProblem):
 
     @staticmethod
     def check(model: Model, table: Table) -> None:
-        """As for positions; raises ModelError for a model without a field."""
+        """Check the table as one of positions; raises ModelError for a model without a field."""
         PositionProblem.check(model, table)
         if STRENGTH not in model.effects:
             raise ModelError(
@@ -128,7 +128,7 @@ class FieldProblem(PositionProblem):
             )
 
     def residual_by(self, steps: Sequence[Step]) -> Array:
-        """As a share of the field's strength that the outputs show, not of the model's strength.
+        """The residual as a share of the field strength that the outputs show, not of the model's strength.
 
         Relative to the model's own strength, an infinite field would make every residual 0.
         """
@@ -170,7 +170,7 @@ class SummedProblem(Problem):
 
     @cached_property
     def white(self) -> Array | None:
-        """From the samples of each row."""
+        """White noise of each row, from its samples."""
         return self.table.white
 
     @property
@@ -243,25 +243,25 @@ class TurnProblem(SummedProblem):
         return self.table.input_unit
 
     def residual_by(self, steps: Sequence[Step]) -> Array:
-        """What the turns and rests leave, shape (channels, n)."""
+        """The residual of turns and rests, shape (channels, n)."""
         return self.table.residual(backward(self.samples, steps))
 
     def sensed(self, theta: Array) -> Array:
-        """As the model has it from the outputs."""
+        """The rates that the model computes from the outputs."""
         steps = self.layout.steps(theta)
         return sensed(backward(self.samples, steps), self.samples, steps)
 
     def of_output(self, theta: Array, changes: Array) -> Array:
-        """By how the rates follow each output."""
+        """Derivative of the rates with respect to each output."""
         by_response = self._by_response(self._chain_at(self.layout.steps(theta)))
         return self.table.add_up(by_response @ changes)
 
     def _chain_at(self, steps: Sequence[Step]) -> LinearisedChain:
-        """From the outputs back to the rates."""
+        """The linearised inverse of the chain: from the outputs to the rates."""
         return LinearisedChain(self.samples, steps, backward(self.samples, steps))
 
     def _by_response(self, chain: LinearisedChain) -> Array:
-        """How the residual of its turn follows the response at each sample, shape (samples, channels, 3)."""
+        """Derivative of each turn's residual with respect to the response per sample, (samples, channels, 3)."""
         slope = slope_at(chain.static, self.samples, chain.steps)
         by_rate = self.table.by_rate(chain.static).transpose(0, 2, 1)
         return np.asarray(-np.linalg.solve(slope.transpose(0, 2, 1), by_rate).transpose(0, 2, 1))

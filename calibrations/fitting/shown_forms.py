@@ -83,7 +83,7 @@ class Shown:
 
     @property
     def without_forms(self) -> Sizes:
-        """No form acts."""
+        """The sizes of all forms set to zero."""
         return estimate(self.gram, {}, {})
 
     def gain_apart(self, sizes: Sizes) -> float:

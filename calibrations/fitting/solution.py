@@ -64,7 +64,7 @@ class Solution:
         return self.held_out_with(np.zeros((*self.residual.shape, 0)))
 
     def held_out_with(self, extra: Array) -> float:
-        """The same when columns (channels, n, k) join the fit."""
+        """The held-out error with columns (channels, n, k) added to the fit."""
         jacobian = np.concatenate([self.jacobian, extra], axis=2)
         theta = np.append(self.theta, np.zeros(extra.shape[2]))
         no_bound = np.full(extra.shape[2], np.inf)
@@ -102,14 +102,14 @@ class Solution:
         return not self.noise.known and not self.problem.smooth.size
 
     def in_floor(self, floor: Array) -> Self:
-        """The same with the noise floor (channels,) of another model, if its own is its residual.
+        """The solution with the noise floor (channels,) of another model, if its own floor is its residual.
 
         All models of a search share one floor. With a floor of its own each, no two would be comparable.
         """
         return replace(self, noise=replace(self.noise, reference=floor)) if self.residual_is_noise else self
 
     def in_white_noise(self) -> Self:
-        """The same in the white noise of its rows, if that is known.
+        """The solution with the white noise of its rows as its floor, if that noise is known.
 
         Its slow noise contains the part that the next effect explains. A fit that begins in white noise depends only on
         the model and the data, not on the fits before it.

@@ -97,7 +97,7 @@ def scatter_remark(table: Table) -> str | None:
 
 
 def _of_field(table: Table) -> Array | None:
-    """Of the magnitude, as a share of the field, shape (1,)."""
+    """White noise of the magnitude, as a share of the field, shape (1,)."""
     if table.n < 9 + FEWEST_FREE_ROWS or coverage_fault(table, SOFT_IRON) is not None:
         return None
     return excess_over_ellipsoid(table)
@@ -118,7 +118,7 @@ def excess_over_ellipsoid(table: Table) -> Array:
 
 
 def _of_rates(table: Table) -> Array | None:
-    """Of each output, in its unit, shape (3,)."""
+    """White noise of each output, in its unit, shape (3,)."""
     columns = np.column_stack([np.ones(table.n), rate_deg_s(table)])
     if all(f"a{axis}" in table for axis in AXES):
         columns = np.column_stack([columns, specific_force_g(table)])

@@ -51,7 +51,7 @@ def parse_cell(cell: str) -> float:
 
 
 def _zone_s(zone: str) -> float:
-    """How much a time zone, such as `+02:00`, is ahead, s."""
+    """Offset of a time zone, such as `+02:00`, in s."""
     if zone in ("", "Z"):
         return 0.0
     return float(zone[0] + "1") * (3600 * int(zone[1:3]) + 60 * int(zone[-2:] if len(zone) > 3 else 0))

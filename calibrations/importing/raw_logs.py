@@ -134,7 +134,7 @@ CELLS_PER_EDGE = 9  # of a cube's face
 
 
 def thin_by_direction(log: Table) -> Table:
-    """One row of a hand-turned magnetometer's log for each direction, in order.
+    """Thin the log of a hand-turned magnetometer to one row for each direction, in order.
 
     The sphere of directions is divided into cells of about 10 deg (a cube's faces in squares). The middle row in time
     represents a cell: a mean over a turn would be too short, and a long rest would outweigh the turns.

@@ -86,7 +86,7 @@ class Movement:
 
     @property
     def size(self) -> float:
-        """Its integral about that axis."""
+        """The integral of the rate about the axis of the turn."""
         return float(abs(self.integral[self.axis]))
 
 

@@ -91,7 +91,7 @@ class ChannelNoise:
 
     @property
     def cleaned_allan(self) -> Curve:
-        """The same without the disturbances that were removed."""
+        """The Allan deviation without the disturbances that were removed."""
         return self.search.still.allan[self.axis]
 
     @property
@@ -138,7 +138,7 @@ class ChannelNoise:
         return Coefficient(value, (upper - value) / INTERVAL_STDS, unit, upper, time_s, None, rivals)
 
     def _estimates(self, effect: Effect) -> list[Estimate]:
-        """Of an effect's parameters in this channel, as every command shows them; none for an effect not in the fit."""
+        """Estimates of an effect's parameters in this channel; empty for an effect that is not in the fit."""
         return [estimate for estimate in self.search.end.model.estimates(effect.name) if estimate.axis == self.axis]
 
     def _companions(self, effect: Effect) -> list[Effect]:
@@ -163,12 +163,12 @@ class NoiseAnalysis(Result):
 
     @cached_property
     def channels(self) -> dict[str, ChannelNoise]:
-        """By axis, without the disturbances that could be removed."""
+        """Channels by axis, without the disturbances that could be removed."""
         return _channels(self.record, self.search)
 
     @cached_property
     def uncleaned(self) -> dict[str, ChannelNoise] | None:
-        """By axis, with the disturbances; None where none was removed."""
+        """Channels by axis, with the disturbances; None where none was removed."""
         return _channels(self.record, self.search.uncleaned) if self.search.uncleaned is not None else None
 
     @cached_property

@@ -58,7 +58,7 @@ class Calibration:
 
     @property
     def alternatives(self) -> dict[str, tuple[str, ...]]:
-        """By cause, the effects that the record cannot separate from it."""
+        """For each cause, the effects that the record cannot separate from it."""
         names = self.signal.names
         rivals = {CAUSES.get((r.kind, r.cause)) for pattern in self.patterns for r in pattern.rivals}
         by_search = self.signal.findings.alternatives
@@ -72,7 +72,7 @@ class Calibration:
 
     @property
     def separations(self) -> Mapping[str, Experiment]:
-        """By cause in doubt, the experiment that separates it from its rivals."""
+        """For each uncertain cause, the experiment that separates it from its rivals."""
         pattern_in_doubt = next((pattern for pattern in self.patterns if pattern.rivals), None)
         experiment = experiment_for_pattern(pattern_in_doubt, self.start.still.length_s) if pattern_in_doubt else None
         return {self.signal.causes[0]: experiment} if experiment and self.alternatives else {}

@@ -94,7 +94,7 @@ class DeviationComparison:
 
     @property
     def deviations(self) -> Array:
-        """How many standard deviations the variance is off."""
+        """The deviation of the variance from that of the model, in standard deviations."""
         return np.asarray((self.ratio**2 - 1) * np.sqrt(self.edf / 2))
 
     @property
@@ -131,7 +131,7 @@ def mismatch(fit: NoiseFit) -> dict[str, float]:
 
 
 def deviation(fit: ChannelFit, tau_s: Array) -> Array:
-    """Of all effects and lines, shape of `tau_s`."""
+    """Allan deviation of all effects and lines, shape of `tau_s`."""
     total = sum(variance_parts(fit, tau_s).values(), np.zeros(len(tau_s)))
     return np.asarray(np.sqrt(np.maximum(total, np.finfo(float).tiny)))
 
@@ -157,7 +157,7 @@ PEAK = 0.371  # cycles to an averaging time at which an Allan variance listens m
 
 @dataclass(frozen=True)
 class Stretch:
-    """From `low_hz` to `high_hz` the density is `ratio` times that of the model, by a chance that allows for all."""
+    """A band from `low_hz` to `high_hz` in which the density is `ratio` times that of the model."""
 
     axis: str
     low_hz: float
@@ -173,7 +173,7 @@ class Stretch:
 
     @property
     def text(self) -> str:
-        """In words."""
+        """The band and its ratio, as a sentence."""
         low, high = self.tau_s
         ratio_text = f"{self.ratio:.3g} x" if self.ratio > 1 else f"only {self.ratio:.2g} x"
         band_text = (
@@ -222,7 +222,7 @@ TIME, FREQUENCY = "averaging time", "frequency"
 
 
 def places(fit: NoiseFit) -> tuple[Place, ...]:
-    """Where a noise model fails: surest first, times before frequencies of the same channel."""
+    """The places where a noise model fails: surest first, times before frequencies of the same channel."""
     curves = tuple(compared_deviations(fit).values())
     return tuple(_failures(fit, curves))
 
@@ -316,12 +316,12 @@ class Levels:
 
     @property
     def ratio(self) -> float:
-        """Of the highest to the lowest."""
+        """Ratio of the highest level to the lowest."""
         return float(self.levels.max() / self.levels.min())
 
     @property
     def text(self) -> str:
-        """In words."""
+        """The change of the level, as a sentence."""
         start_s = int(np.argmax(self.levels)) * self.part_s
         return (
             f"the level of {self.axis} changes with time, by a factor of {self.ratio:.3g}: it is highest from "
@@ -330,7 +330,7 @@ class Levels:
 
 
 def noise_levels(fit: ChannelFit) -> Levels | None:
-    """The same of one channel; None if its record is too short."""
+    """Levels of one channel's noise over its record; None if the record is too short."""
     channel = fit.channel
     means, step_s = means_without(channel, fit.lines), channel.sampling.interval_s
     length = len(means) // PARTS

@@ -135,7 +135,7 @@ class StillRecord(Dataset[NoiseFit]):
         return self._search(self.fit(model), effects)
 
     def search_on(self, start: NoiseFit, origin: NoiseFit, effects: Mapping[str, Effect]) -> NoiseFindings:
-        """The same from a fitted model."""
+        """Search for missing effects, starting from a fitted model."""
         return self._search(fit(start.model, start.still), effects, origin)
 
     def candidates(
@@ -185,7 +185,7 @@ class StillRecord(Dataset[NoiseFit]):
         return result
 
     def addition(self, effect: Effect, model: Model, effects: Mapping[str, Effect]) -> NoiseFindings:
-        """One process, with the processes that the record cannot separate from it, and further missing ones."""
+        """Add one process; report those that the record cannot separate from it, and further missing ones."""
         base = self.fit(model)
         step = self.step(effect, base)
         first = search(base.still, base.model, effects)

@@ -217,7 +217,7 @@ def interval(deviation: float, edf: float) -> tuple[float, float]:
 
 
 def _autocovariance(t: Array, factor: float, alpha: int, order: int) -> Array:
-    """Of differences of the given order, but for a constant factor; t in averaging times."""
+    """Autocovariance of differences of the given order, except for a constant factor; t in averaging times."""
     weights = {2: (6, -4, 1), 3: (20, -15, 6, -1)}[order]
     total = weights[0] * _average_autocovariance(t, factor, alpha)
     for lag, weight in enumerate(weights[1:], 1):
@@ -287,7 +287,7 @@ def _deviation(phase: Array, m: int) -> float:
 
 
 def curve_at(values: Array, rate_hz: float, tau_s: Sequence[float], source: str) -> Curve:
-    """At the nearest whole numbers of samples, shape (k,), from values (n,).
+    """Allan deviations of values (n,) at averaging times (k,), each rounded to a whole number of samples.
 
     Raises DataError for a time below one sample, TooFewRows for one of which the record does not hold two.
     """

@@ -154,7 +154,7 @@ TAKEN_FOR = "rate-random-walk"  # the process with nearly the spectrum of each o
 
 
 def repeat_record(length_s: float) -> Experiment:
-    """The same record again."""
+    """An experiment that repeats the same record."""
     return Experiment(PROCEDURE, {"duration_s": _round_up_to_tens(length_s)}, (), REPEAT_SHOWS)
 
 
@@ -281,7 +281,7 @@ def structure_of(search: Search) -> str | None:
 
 
 def alternatives(search: Search, names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
-    """By named effect, those that the record cannot separate from it; a low-pass is named by its effect."""
+    """For each named effect, those that the record cannot separate from it; a low-pass is named by its effect."""
     filtered = {name: (OUTPUT_FILTER,) for name in names if possible_corner_hz(search, name) is not None}
     rivals_by_name = {name: (*search.rivals.get(name, ()), *filtered.get(name, ())) for name in names}
     return {name: rivals for name, rivals in rivals_by_name.items() if rivals}

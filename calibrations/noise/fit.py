@@ -49,7 +49,7 @@ Deviations = Mapping[tuple[str, str], float]  # of each strength's square and of
 
 
 def estimates(fit: ChannelFit, effect: Effect, unit: str, deviations: Deviations) -> Iterator[Estimate]:
-    """Of one effect's parameters, in the order in which they are declared."""
+    """Estimates of one effect's parameters, in the order in which they are declared."""
     lines = "lines" in effect.places
     values = _line_estimates(fit, unit) if lines else _spectrum_estimates(fit, effect, unit, deviations)
     hidden_noise = hidden_in(fit.channel.oddities)
@@ -131,7 +131,7 @@ def upper_bound(
 
 
 def _shape(effect: Effect, fit: ChannelFit) -> Values:
-    """Its fitted parameters but the strength."""
+    """The fitted parameters of an effect, except its strength."""
     return {p.name: fit.values[effect.name][p.name] for p in effect.parameters[1:]}
 
 
@@ -203,7 +203,7 @@ class NoiseFit:
 
     @property
     def log_likelihood(self) -> float:
-        """Of all channels."""
+        """Log-likelihood of all channels together."""
         return sum(channel.log_likelihood for channel in self.channels)
 
     @property
@@ -265,7 +265,7 @@ def fit_channel(channel: Channel, effects: Sequence[Effect]) -> ChannelFit:
 
 
 def line_capacity(effects: Iterable[Effect]) -> int:
-    """How many lines the effects can hold."""
+    """The number of lines that the effects can hold."""
     return sum(len(effect.parameters) // 2 for effect in effects if "lines" in effect.places)
 
 

@@ -130,7 +130,7 @@ def _measure_second(tree: Tree, level: int) -> None:
 
 @njit(cache=True, nogil=True)
 def _measure_third(tree: Tree, level: int) -> None:
-    """The same for windows of three."""
+    """Add up the squares over all windows of three that end in a new bin."""
     n, old = tree.filled[level], tree.measured[level]
     phase, summed = integrals(tree.sums[level][:n], tree.phases[level][:n], 2.0**level)
     for f in range(FACTORS if level == 0 else 1):
@@ -144,7 +144,7 @@ def _measure_third(tree: Tree, level: int) -> None:
 
 @njit(cache=True, nogil=True)
 def running_sum(b: Array, mean: float) -> Array:
-    """Of bins less their mean, shape (n + 1,) from 0."""
+    """Running sum of bins less their mean, shape (n + 1,), starting with 0."""
     phase = np.zeros(len(b) + 1)
     x = 0.0
     for i in range(len(b)):

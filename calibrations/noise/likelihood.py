@@ -54,7 +54,7 @@ def maximise(G: Array, measured: Array, freedom: Array, base: Array) -> tuple[Ar
 def maximise_from(
     theta: Array, G: Array, measured: Array, freedom: Array, base: Array, converged: float = CONVERGED
 ) -> tuple[Array, float]:
-    """The same from coefficients (p,) near the maximum, such as those for a shape nearby."""
+    """Maximise the likelihood from coefficients (p,) near the maximum, such as those for a similar shape."""
     value = log_likelihood(base + G @ theta, measured, freedom)
     for _ in range(SCORING_STEPS):
         step = _scoring_step(G, measured, freedom, base, theta) - theta
@@ -92,7 +92,7 @@ def profile(G: Array, shapes: Array, measured: Array, freedom: Array) -> tuple[A
 
 @njit(cache=True, nogil=True)
 def _scoring_step(G: Array, measured: Array, freedom: Array, base: Array, theta: Array) -> Array:
-    """Where the weighted least squares without negative coefficients has its minimum: coordinate by coordinate."""
+    """One scoring step: weighted least squares without negative coefficients, coordinate by coordinate."""
     p = len(theta)
     S = base + G @ theta
     weighted = G / (S**2 / freedom).reshape(-1, 1)
@@ -144,7 +144,7 @@ class ChannelFit:
 
     @cached_property
     def frequency_hz(self) -> Array:
-        """Of each band."""
+        """Frequency of each band."""
         return np.concatenate([part.frequency_hz for part in self.parts])
 
     def part_of(self, effect: Effect, values: Values | None = None) -> Array:
@@ -169,7 +169,7 @@ class ChannelFit:
 
     @cached_property
     def log_likelihood(self) -> float:
-        """Up to a constant of the bands."""
+        """Log-likelihood, except for a constant that depends only on the bands."""
         return float(log_likelihood(self.expected, self.density, self.freedom))
 
     @cached_property
@@ -207,7 +207,7 @@ def effect_spectrum(effect: Effect, parts: Sequence[Bands], values: Values) -> A
 
 
 def unit_spectrum(effect: Effect, parts: Sequence[Bands], shape: Values) -> Array:
-    """The same for a strength of 1."""
+    """Spectrum of an effect with a strength of 1."""
     return effect_spectrum(effect, parts, {effect.parameters[0].name: 1.0, **shape})
 
 

@@ -62,7 +62,7 @@ class Pattern:
 
     @cached_property
     def form(self) -> Array:
-        """Its form, of mean 0, shape (m,)."""
+        """The pattern's form, of mean 0, shape (m,)."""
         form = self.make()
         return np.asarray(form - form.mean())
 
@@ -73,7 +73,7 @@ class Pattern:
 
     @property
     def plain(self) -> str:
-        """In words."""
+        """The pattern in words."""
         return self.words.replace("{}", f"{self.size:+.4g} +- {self.std:.1g}")
 
     @property
@@ -88,7 +88,7 @@ class Pattern:
 
     @property
     def text(self) -> str:
-        """In words, with the patterns that the record cannot separate from it."""
+        """The pattern in words, with the patterns that the record cannot separate from it."""
         names_of_rivals = " or ".join(rival.plain for rival in self.rivals)
         return (
             f"{self.plain} (this record cannot separate it from {names_of_rivals})" if names_of_rivals else self.plain

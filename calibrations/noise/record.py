@@ -117,7 +117,7 @@ def require_length(n: int, rate_hz: float, corner_hz: float, source: str) -> Non
 
 
 def require_numbers(samples: Array, count_before: int, source: str) -> Array:
-    """As float64. Raises DataError where one is no number."""
+    """Convert the samples to float64. Raises DataError for a value that is not a number."""
     try:
         samples = samples.astype(np.float64, casting="same_kind" if samples.dtype.kind == "f" else "safe")
     except TypeError:
@@ -155,17 +155,17 @@ class Channel:
 
     @property
     def sampling(self) -> Sampling:
-        """Of the means."""
+        """Sampling of the means."""
         return Sampling(self.rate_hz, self.size)
 
     @property
     def length_s(self) -> float:
-        """Of the record."""
+        """Length of the record."""
         return self.n / self.rate_hz
 
     @property
     def highest_hz(self) -> float:
-        """Up to which its spectrum is fitted: behind a filter the converter's own noise begins to show beyond."""
+        """The highest frequency of the fit: beyond it, a filter leaves only the converter's own noise."""
         return min(self.rate_hz / 2, self.corner_hz / 2)
 
     def halves(self) -> tuple[Channel, Channel]:
@@ -184,7 +184,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class Sensed:
-    """From an output to the sensed quantity: multiplied with `factor` it is in `unit`, such as 1.02 g for a V."""
+    """Conversion of an output to the sensed quantity: output times `factor` is in `unit`, such as 1.02 g for 1 V."""
 
     factor: float
     unit: str
@@ -219,7 +219,7 @@ class Still:
 
     @property
     def length_s(self) -> float:
-        """From the first sample to the last."""
+        """Time from the first sample to the last."""
         return self.channels[0].length_s
 
     @property
@@ -230,7 +230,7 @@ class Still:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Of the channels."""
+        """Names of the channels."""
         return tuple(channel.axis for channel in self.channels)
 
 

@@ -94,7 +94,7 @@ class Steps:
         self._last = float(samples[-1])
 
     def hidden(self, curve: Curve, rate_hz: float, corner_hz: float) -> HiddenNoise | None:
-        """By the Allan deviations of the samples, behind a first-order low-pass; None where noise is not hidden."""
+        """Noise below the converter's step, from Allan deviations behind a first-order low-pass; None if not hidden."""
         limit = LEAST * self._step**2
         if not np.isfinite(self._step) or _variance_at_converter(curve, rate_hz, corner_hz) >= limit:
             return None
@@ -160,7 +160,7 @@ class Outliers:
         self._waiting = waiting
 
     def found(self) -> Wild:
-        """Of all samples."""
+        """Wild samples of the whole record."""
         waiting = self._waiting
         if len(waiting) > 2 * SIDE:
             head = waiting[SIDE:0:-1] if not self._judged else waiting[:0]
@@ -198,7 +198,7 @@ class Outliers:
 
 
 def _median(part: Array, start: int) -> Array:
-    """Of the three samples from `start` on, for each of the middle ones."""
+    """Medians of each three neighbouring samples, from `start` on."""
     n = len(part) - 2 * SIDE
     a, b, c = (part[start + k : start + k + n] for k in range(SIDE))
     return np.asarray(np.maximum(np.minimum(a, b), np.minimum(np.maximum(a, b), c)))
@@ -310,7 +310,7 @@ def hidden_in(oddities_of_channel: Iterable[Oddity]) -> HiddenNoise | None:
 def oddities(
     wild: Wild, stuck: Run | None, hidden_noise: HiddenNoise | None, n: int, rate_hz: float, variance: float
 ) -> tuple[Oddity, ...]:
-    """Of a record of n samples, whose neighbours have the Allan variance `variance`."""
+    """Faults in a record of n samples whose neighbours have the Allan variance `variance`."""
     result = []
     if wild.count:
         result.append(_wild(wild, n, rate_hz, variance))

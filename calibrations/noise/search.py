@@ -96,7 +96,7 @@ class Search:
 
     @cached_property
     def rivals(self) -> dict[str, tuple[str, ...]]:
-        """By missing process, those that explain the record as well in its place."""
+        """For each missing process, those that explain the record as well in its place."""
         return {effect.name: tuple(self._rivals(effect)) for effect in self.mixture.effects}
 
     @cached_property

@@ -111,7 +111,7 @@ class SignalSearch:
 
     @property
     def lags(self) -> tuple[str, ...]:
-        """How far the sensor is behind or ahead of the thermometer, in words."""
+        """The lags of the sensor behind the thermometer, in words."""
         leads = {term.constants.get("lead_s", 0.0) for term in (self.steps[-1] if self.steps else ())}
         long = sorted(lead for lead in leads if abs(lead) > self._shortest_s)
         return tuple(
@@ -125,7 +125,7 @@ class SignalSearch:
         return float(np.median(np.diff(self.table.time_s)))
 
     def with_line(self, name: str, effects: Mapping[str, Effect], still: Still) -> SignalSearch:
-        """The same with a straight line in place of one effect; the others are fitted again from their own starts."""
+        """The search with a straight line in place of one effect; the others are fitted again from their own starts."""
         line = Term(effects[PLACE])
         last = tuple(line if term.name == name else replace(term, estimates=()) for term in self.steps[-1])
         fit = fit_rows(_bias_model(last, effects), self.table)
@@ -138,7 +138,7 @@ class SignalSearch:
         return replace(self, steps=tuple(steps))
 
     def without(self, name: str, effects: Mapping[str, Effect], still: Still) -> SignalSearch:
-        """The same without one effect; the others are fitted again."""
+        """The search without one effect; the others are fitted again."""
         position = self.names.index(name)
         remaining = [tuple(term for term in terms if term.name != name) for terms in self.steps]
         fit = fit_rows(_bias_model(_rename_axes(remaining[-1], still.axes, AXES), effects), self.table)

@@ -54,7 +54,7 @@ Path = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Level:
-    """One level: how far above the lowest it is, its share of the time, and the mean time at it, s."""
+    """One level: its height above the lowest, its share of the time, and the mean time at it, s."""
 
     height: float
     share: float
@@ -76,12 +76,12 @@ class Telegraph:
 
     @property
     def kind(self) -> str:
-        """As a disturbance."""
+        """The kind of this disturbance."""
         return TWO_LEVELS if len(self.levels) == 2 else SEVERAL_LEVELS
 
     @property
     def text(self) -> str:
-        """In words."""
+        """The levels in words."""
         start = f"random telegraph noise (burst noise, popcorn): {self.axis} jumps between"
         if self.kind == TWO_LEVELS:
             return f"{start} {self._two_levels()}. Its spectrum is that of a Gauss-Markov process"

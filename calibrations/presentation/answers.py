@@ -107,7 +107,7 @@ def unknown_text(result: Discovery[Any]) -> str:
 
 
 def _summary(result: Discovery[Any]) -> str:
-    """Where something acts, which effect it is, how much, and how certain; "" without any."""
+    """The place that acts, the effect, its size and its certainty, as one sentence; "" if there is none."""
     rows = [
         (
             line.place,

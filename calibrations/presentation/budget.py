@@ -95,7 +95,7 @@ def budget_section(fit: Fit) -> Section | None:
 
 
 def budget_document(fit: Fit) -> Mapping[str, Any] | None:
-    """As JSON: the combined uncertainty of each parameter, and its contributions by source. None as above."""
+    """JSON of the combined uncertainty of each parameter, with its contributions by source; None without any."""
     budget = _budget(fit)
     if budget is None:
         return None

@@ -100,7 +100,7 @@ def _one_bar_a_scale(data: Sequence[Trace]) -> None:
 
 
 def height_px(chart: c.Chart) -> int:
-    """How high a chart of several rows should be."""
+    """Height of a chart with several rows."""
     return round(sum(chart.heights) * INCH_PX + ROW_GAP)
 
 

@@ -200,7 +200,7 @@ class ChannelResidual:
 
     @cached_property
     def factor(self) -> float:
-        """From the residual's own unit to `unit`."""
+        """Factor from the residual's own unit to `unit`."""
         return 1e3 / self.scale if self.in_g else 1e3
 
     @cached_property
@@ -210,7 +210,7 @@ class ChannelResidual:
 
     @cached_property
     def residual(self) -> Array:
-        """Of the rows drawn, in `unit`."""
+        """The residual of the rows that are drawn, in `unit`."""
         return np.asarray(self.factor * self.fit.residual[self.c, self.rows])
 
     @cached_property
@@ -225,7 +225,7 @@ class ChannelResidual:
 
     @property
     def label(self) -> str:
-        """Of the residual's axis."""
+        """Label of the residual's axis."""
         kind = self.fit.table.type
         if kind.magnitude:
             return f"residual of |{kind.symbol}| ({self.unit})"

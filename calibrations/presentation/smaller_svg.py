@@ -13,7 +13,7 @@ FINE = re.compile(r"(\.\d\d)\d+")
 
 
 def compact(text: str) -> str:
-    """The same drawing in about a third of the bytes."""
+    """Shorten a drawing to about a third of its bytes, without a visible change."""
     text = MARKERS.sub(_hoist_style, text)
     text = POINTS.sub(_merge_groups, text)
     text = COORDINATES.sub(_round_attribute, text)
@@ -39,7 +39,7 @@ def _round_attribute(match: re.Match[str]) -> str:
 
 
 def compact_svg(text: str) -> str:
-    """The same drawing for a page that holds many: digits beyond 0.1 pt, names and words for machines left out."""
+    """Shorten a drawing for a page with many: removes digits beyond 0.1 pt, names, and words for machines."""
     text = re.sub(r"<!DOCTYPE.*?>\s*|<metadata>.*?</metadata>\s*|<\?xml.*?\?>\s*", "", text, flags=re.DOTALL)
     text = re.sub(r'<g id="[^"]*"', "<g", text).replace("font-family: 'DejaVu Sans', Verdana, sans-serif; ", "")
     text = re.sub(r' transform="rotate\(-0 [^"]*"', "", text)

@@ -46,7 +46,7 @@ class FoundFrames:
         return np.asarray(self.data[places], dtype=np.int64)
 
     def parts(self, frame_numbers: Ints, first: int, count: Ints, size: int) -> Bytes:
-        """From byte `first`, `count` bytes of each chosen frame, with zeros up to `size`: shape (n, size)."""
+        """Bytes `first` to `first + count` of each chosen frame, filled with zeros up to `size`: shape (n, size)."""
         rows = np.zeros((len(frame_numbers), size), dtype=np.uint8)
         for n, group in groups(count):
             used = min(n, size)

@@ -110,7 +110,7 @@ class Thermometer:
 
 
 class Moment(NamedTuple):
-    """One moment on both clocks, s."""
+    """The same moment on both clocks, s."""
 
     sensor_s: float
     host_s: float
@@ -187,7 +187,7 @@ class Reception:
         return [min(part, key=lambda moment: moment.host_s - moment.sensor_s) for part in parts if part]
 
     def _compare_numbers(self, batch: Batch) -> tuple[NDArray[np.bool_], Ints | None]:
-        """Which samples are repeated, and the messages that are missing before each, both by the numbers."""
+        """Compare the message numbers: which samples are repeated, and how many messages are missing before each."""
         if batch.missing is None:
             return np.zeros(len(batch.values), dtype=bool), None
         return batch.missing < 0, np.maximum(batch.missing, 0)

@@ -22,7 +22,7 @@ SLIP_S = 0.4
 
 @dataclass(frozen=True)
 class Hand:
-    """How a person handles a sensor. Shares are probabilities for one position."""
+    """The way in which a person handles a sensor. Shares are probabilities for one position."""
 
     reaction_s: float = 0.8
     turning_deg_s: float = 90.0

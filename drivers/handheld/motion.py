@@ -25,7 +25,7 @@ NORTH = (1.0, 0.0, 0.0)  # in the frame of the sensor, as it lies at first
 
 @dataclass(frozen=True)
 class Segment:
-    """From `start_s` to `end_s` the direction upward goes from `before` to `after`, both unit vectors.
+    """A turn: from `start_s` to `end_s` the upward direction changes from `before` to `after`, both unit vectors.
 
     `tremor`: share of the hand's tremor that reaches the sensor. `bumps`: whether it was put down at `start_s`.
     `north`: the direction to the north at `start_s`. Besides the shortest way, the sensor turns by `heading_rad` about
@@ -46,7 +46,7 @@ class Segment:
 
 @dataclass(frozen=True)
 class Shaking:
-    """How a hand trembles, and how hard it puts the sensor down."""
+    """The tremor of a hand, and the force with which it puts the sensor down."""
 
     tremor_g: float  # rms of the acceleration along each axis
     tremor_deg: float
@@ -161,7 +161,7 @@ def _cross(vectors: Floats) -> tuple[Floats, Floats]:
 
 
 def _jacobians(vectors: Floats) -> Floats:
-    """How the rotation by a vector turns as the vector changes, for vectors (n, 3), shape (n, 3, 3)."""
+    """Derivatives of the rotations by vectors (n, 3) with respect to these vectors, shape (n, 3, 3)."""
     angle = np.linalg.norm(vectors, axis=1)[:, None, None]
     cross, square = _cross(vectors)
     third = np.where(angle > 1e-3, (1 - np.sinc(angle / np.pi)) / np.maximum(angle, 1e-3) ** 2, 1 / 6)

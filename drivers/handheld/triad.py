@@ -73,7 +73,7 @@ def steady_v(triad: Triad, force_g: Floats) -> Floats:
 
 
 def _displacement_nm(mass: Mass, load_g: Floats) -> Floats:
-    """Where the springs balance the load."""
+    """Displacement at which the springs balance the load."""
     load_nm = load_g * per_g_nm(mass.resonance_hz)
     x_nm, hard = load_nm.copy(), 1e-6 * mass.hardening_per_um2
     for _ in range(NEWTON):

@@ -79,7 +79,7 @@ class HandheldWorld(World):
     def adc_volts(
         self, inputs: Sequence[str], start_s: float, interval_s: float, n: int, places: Sequence[int] | None = None
     ) -> Floats:
-        """As `World.adc_volts`, with the inputs of INPUTS too, all three sampled at the begin of a scan."""
+        """Voltages as from `World.adc_volts`; the inputs of INPUTS are also sampled, all at the start of a scan."""
         own_places = [k for k, name in enumerate(inputs) if name in INPUTS]
         if not own_places:
             return super().adc_volts(inputs, start_s, interval_s, n, places)

@@ -159,7 +159,7 @@ class LineSensor(DigitalSensor[Settings, LineDecoder]):
         )
 
     def _lost(self, reception: Reception, decoder: LineDecoder) -> int:
-        """Without a time, a damaged line is a lost sample."""
+        """Number of lost samples. Without a time, each damaged line is a lost sample."""
         return reception.lost + (decoder.damaged if TIME not in self.settings.columns else 0)
 
 

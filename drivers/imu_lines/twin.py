@@ -38,7 +38,7 @@ class Talker(DigitalTwin):
         return round(tick / self._settings.rate_hz / self._settings.time_unit_s) % WRAP
 
     def _spoilt(self, message: bytes, now_s: float) -> bytes:
-        """With another baud rate, some bytes still look like an end of line."""
+        """Garble the message as at another baud rate: some bytes still look like an end of line."""
         garbled = super()._spoilt(message, now_s)
         return garbled if garbled.endswith(b"\n") or not garbled else garbled[:-1] + b"\n"
 

@@ -61,7 +61,7 @@ class Settings(Inputs[int]):
             raise ValueError("interchannel_s must be a time of 0 s or more")
 
     def lag_s(self, channel: str) -> float:
-        """How long after the beginning of a scan this channel is sampled."""
+        """Delay of this channel's samples after the beginning of a scan."""
         return list(self.channels).index(channel) * self.interchannel_s
 
 

@@ -116,7 +116,7 @@ class Calibration:
 
     @classmethod
     def from_flash(cls, words: Sequence[int], range_v: float) -> Calibration:
-        """Of the fast converter, out of the words read from flash."""
+        """Calibration of the fast converter, from words of the flash memory."""
         constants = struct.unpack(f">{len(words) // 2}f", struct.pack(f">{len(words)}H", *words))
         first = 4 * RANGES_V.index(range_v)
         return cls(*constants[first : first + 4])

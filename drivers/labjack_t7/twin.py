@@ -61,7 +61,7 @@ def spoilt(data: bytes, samples: int, faults: Faults, now_s: float) -> bytes:
 
 
 def _order(numbers: NDArray[np.int64], faults: Faults, now_s: float) -> NDArray[np.intp]:
-    """In which order packets of these transaction numbers are sent, as indices."""
+    """The order in which packets with these transaction numbers are sent, as indices."""
     order = np.arange(len(numbers), dtype=np.intp)
     if (lost_packet := faults.size("lost-packet", now_s)) is not None:
         return np.flatnonzero(numbers != lost_packet - 1)
@@ -246,7 +246,7 @@ class Converter(Twin):
             self._stream = None
 
     def _restart(self) -> None:
-        """As after power-on; the digital lines are high then."""
+        """Restart as after power-on; the digital lines are then high."""
         self._stream, self._words = None, _initial_words()
         self._world.power(True)
         for port in self.ports:

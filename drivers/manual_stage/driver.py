@@ -21,7 +21,7 @@ UNIT = "deg"
 
 @dataclass(frozen=True)
 class Settings:
-    """One stage: its dial, how near to the asked angle a reading must be, its limits, how long a move takes a person.
+    """Settings of one stage: its dial, the tolerance of a reading, its limits, and the time of a move by hand.
 
     Raises ValueError for what no stage can be.
     """
@@ -73,7 +73,7 @@ class ManualStage:
         return [Check("dial", True, f"read by a person to {60 * self.settings.resolution_deg:g} arcmin")]
 
     def close(self) -> None:
-        """Nothing to release."""
+        """Do nothing: the stage has no link."""
 
     def angle_deg(self) -> float:
         """The last reading of the dial. Asks the person if there is none yet."""
@@ -88,7 +88,7 @@ class ManualStage:
         return True
 
     def home(self) -> None:
-        """There is nothing to seek."""
+        """Do nothing: a manual stage has no home position."""
 
     def move_to(self, angle_deg: float) -> None:
         """Ask a person to turn the stage to `angle_deg`. Asks nothing if the stage is at this angle already.
@@ -121,7 +121,7 @@ class ManualStage:
         self.settings.way_of_turn(self.name, rate_deg_s, first_deg, last_deg)
 
     def stop(self) -> None:
-        """It turns only while a person turns it."""
+        """Do nothing: the stage turns only while a person turns it."""
 
 
 def connect(address: Address, links: Links, settings: Settings, name: str) -> ManualStage:

@@ -37,7 +37,7 @@ class World(Protocol):
 
 
 class Hand:
-    """At the world's `axis`. What it does is settled by `seed`, time and angle alone, so that a repetition is one."""
+    """The simulated hand at the world's `axis`. Its actions depend on `seed`, time and angle only: they repeat."""
 
     def __init__(self, world: World, axis: str, settings: Settings, seed: int) -> None:
         self._world, self._axis, self._mark_deg, self._seed = world, axis, settings.resolution_deg, seed

@@ -75,7 +75,7 @@ class Settings(DigitalSettings):
 
     @property
     def factor(self) -> float:
-        """From a number in the message to the unit of the output."""
+        """Factor from a number in the message to the unit of the output."""
         return 1.0 if self.message == "HIGHRES_IMU" or self.raw == "count" else 1e-3
 
     @property

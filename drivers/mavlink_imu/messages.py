@@ -144,7 +144,7 @@ class Mavlink:
 
 @dataclass(frozen=True, eq=False)
 class Heads:
-    """What the frames of a stream begin with, each of shape (n,). `version` is the first byte."""
+    """Headers of the frames in a stream, each of shape (n,). `version` is the first byte."""
 
     version: Ints
     sequence: Ints

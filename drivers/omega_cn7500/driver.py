@@ -117,7 +117,7 @@ class Oven:
             )
 
     def _require_fresh(self, shown_c: float) -> None:
-        """On its way to a set point the temperature changes, or the heater follows a thermometer that has stuck."""
+        """Check that the reading changes on the way to a set point; otherwise the thermometer is stuck."""
         under_way = self._running and self._told_c is not None and abs(shown_c - self._told_c) > ARRIVAL_K
         if shown_c != self._shown_c or not under_way:
             self._shown_c, self._since_s = shown_c, self._clock.now()

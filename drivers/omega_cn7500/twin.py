@@ -99,11 +99,11 @@ class Controller(Twin):
         return PROCESS_VALUE.encode(self._temperature_c(now_s) + (self.faults.size("lies", now_s) or 0.0))
 
     def _temperature_c(self, now_s: float) -> float:
-        """What the controller goes by."""
+        """The temperature that the controller measures."""
         return float(self.faults.held("stale", now_s, self._world.thermometer_c()))
 
     def _goal_c(self, now_s: float) -> float:
-        """What the heater is made to reach: without a fault the set point."""
+        """The temperature that the heater works towards: without a fault the set point."""
         if self.faults.size("runaway", now_s) is not None:
             return FULL_C
         if self.faults.size("stale", now_s) is not None:

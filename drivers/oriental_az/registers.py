@@ -89,7 +89,7 @@ class Alarm:
 
     @property
     def words(self) -> str:
-        """What a person does about it: removes the cause, then ends the alarm."""
+        """Instructions for a person: remove the cause, then reset the alarm."""
         reset = "then reset the alarm with `rig check --reset`, or switch the drive off and on"
         return f"{self.remedy}; {reset if self.resettable else 'the alarm needs a power cycle'}"
 

@@ -47,7 +47,7 @@ class Settings:
         require_positive(self, "settle_um", "wave_points", "record_hz", "limit_hz")
 
     def wave(self, name: str, frequency_hz: float, cycle_s: float = e727.USUAL_CYCLE_S) -> Wave:
-        """How the controller `name` plays a frequency. Raises LimitError for one that it cannot play."""
+        """The wave by which the controller `name` plays a frequency. Raises LimitError if it cannot play it."""
         fastest_hz = 1 / (FEWEST_POINTS * cycle_s)
         if not SLOWEST_HZ <= frequency_hz <= fastest_hz:
             raise LimitError(
@@ -64,7 +64,8 @@ class Settings:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What the controller measured of one axis: `position_um`, shape (n,), from the start of the oscillation on."""
+    """Positions of one axis, measured by the controller from the start of the oscillation, `position_um` (n,).
+"""
 
     position_um: NDArray[np.float64]
     interval_s: float
@@ -131,7 +132,7 @@ class Positioner:
         self._gcs.tell(f"{e727.SERVO} {states}")
 
     def position_um(self, axis: str) -> float:
-        """Where an axis is, measured by the controller."""
+        """Position of an axis, measured by the controller."""
         return self._gcs.number(f"{e727.POSITION} {self._id(axis)}")
 
     def move_to(self, axis: str, um: float) -> None:
@@ -235,7 +236,7 @@ class Positioner:
             raise LimitError(fault, "Ask for a positive width, peak to peak")
 
     def _wave(self, frequency_hz: float) -> Wave:
-        """How the controller plays a frequency. Raises LimitError for one that it cannot play."""
+        """The wave by which the controller plays a frequency. Raises LimitError if it cannot play it."""
         cycle_s = self._gcs.number(f"{e727.ASK_PARAMETER} 1 {e727.CYCLE_TIME}")
         return self.settings.wave(self.name, frequency_hz, cycle_s)
 

@@ -215,7 +215,7 @@ class Waves:
         self._cycles, self._until_s = dict(state["cycles"]), dict(state["until_s"])
 
     def running(self, now_s: float) -> list[bool]:
-        """Of each generator, whether it plays."""
+        """For each generator, whether it plays."""
         return [now_s < until_s for until_s in self._until_s.values()]
 
     def halt(self, now_s: float) -> None:

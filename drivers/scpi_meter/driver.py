@@ -79,7 +79,7 @@ class Settings(Inputs[int], NoDigitalLines):
             )
 
     def lag_s(self, channel: str) -> float:
-        """How long after the beginning of a scan this channel is measured."""
+        """Delay of this channel's measurement after the beginning of a scan."""
         return list(self.channels).index(channel) * self.interchannel_s
 
     def commands(self, scans: int) -> list[str]:

@@ -148,7 +148,7 @@ class Url:
         return 1.75e-3 if self.baud > 19200 else 3.5 * self.character_s
 
     def line_s(self, count: int) -> float:
-        """How long `count` bytes are under way."""
+        """Time to transmit `count` bytes."""
         return count * self.character_s + self.gap_s if self.rtu else TCP_LATENCY_S
 
 

@@ -180,7 +180,7 @@ Effect = Callable[[Message, float, Wire], list[Message]]
 
 
 def drop_message(_message: Message, _size: float, _wire: Wire) -> list[Message]:
-    """Nothing arrives."""
+    """Drop the message: nothing arrives."""
     return []
 
 
@@ -233,7 +233,7 @@ def before_noise(sent: Message, size: float, wire: Wire) -> list[Message]:
 
 
 def flip_bit(sent: Message, size: float, wire: Wire) -> list[Message]:
-    """One bit inverted; TCP sends the segment again."""
+    """Invert one bit; TCP sends the segment again."""
     if wire.mends:
         return later(sent, RESEND_S, wire)
     byte, bit_number = divmod(int(size) % (8 * len(sent.data)), 8)

@@ -29,7 +29,7 @@ class PersonLink:
         self.attended_by: Person | None = None
 
     def ask(self, name: str, text: str, unit: str, low: float, high: float, expected: float | None = None) -> float:
-        """As `Person.ask`. Raises LinkRefused if no person is connected."""
+        """Ask the person for a number. Raises LinkRefused if no person is connected."""
         if self.attended_by is None:
             raise LinkRefused(f'no person is at the rig to answer "{text}"', "Ask within a run")
         return self.attended_by.ask(name, text, unit, low, high, expected)

@@ -149,7 +149,7 @@ class Datagrams(Connection):
         return True
 
     def is_behind(self, now_s: float) -> bool:
-        """As for a connection; False before the first datagram."""
+        """Whether bytes are late for the peer; False before the first datagram."""
         return self._client is None or super().is_behind(now_s)
 
     def progress(self, key: str) -> tuple[int, int] | None:

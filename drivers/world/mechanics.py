@@ -83,7 +83,7 @@ def tick(world: State, config: WorldConfig, room: Generator, slow: Generator) ->
 
 @kernel
 def update(world: State, config: WorldConfig, t_ns: int) -> None:
-    """From the motors' angles at `t_ns` to the volts in front of the filter."""
+    """Update the world at `t_ns`, from the motors' angles to the voltages at the filter's input."""
     world.mechanics_ns = t_ns
     gx, gy, gz = load_g(world, config, t_ns)
     disturbances.rock(world, config.oddities, gx, gy)

@@ -153,12 +153,12 @@ def sinusoid_variance(hz: float, lag: float, middle_s: Floats, interval_s: float
 
 
 def random_variance(noise: Noise, interval_s: float) -> float:
-    """Of single samples, V^2: fast processes, and the pulses left on the integrator before and after each."""
+    """Variance of single samples, V^2: fast processes, and the pulses left on the integrator before and after each."""
     return sum(process(noise, k)[0] ** 2 for k in range(FAST)) + noise.pulse_v_s**2 / 6 / interval_s**2
 
 
 def random_mean_variance(noise: Noise, interval_s: float, n: int) -> float:
-    """Of the mean of `n` samples, V^2: fast processes, and the pulses left on the integrator at both ends."""
+    """Variance of the mean of `n` samples, V^2: fast processes, and the pulses left on the integrator at both ends."""
     processes = (process(noise, k) for k in range(FAST))
     ends = noise.pulse_v_s**2 / 6 / (n * interval_s) ** 2
     return sum(mean_variance(rms, time_s, interval_s, n) for rms, time_s in processes) + ends

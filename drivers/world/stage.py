@@ -105,7 +105,7 @@ class Trajectory:
         return list(zip(times, map(self.angle_deg, times), rates, [*slopes, 0.0], strict=True))
 
     def stopped(self, t_s: float) -> Trajectory:
-        """The same move with a stop commanded at `t_s`."""
+        """The move with a stop commanded at `t_s`."""
         return self if self.stop_s is not None else replace(self, stop_s=t_s)
 
 

@@ -44,7 +44,7 @@ class Poses:
 
 @dataclass(frozen=True)
 class Timing:
-    """How poses are visited: alpha moves, then beta, then the rig settles, then it dwells."""
+    """Timing of the visits: alpha moves, then beta, then the rig settles, then it dwells."""
 
     dwell_s: float = 5.0
     interval_s: float = 1e-3  # between samples

@@ -115,7 +115,7 @@ def layout(row: bytes) -> list[Packet] | None:
 
 
 def find_alike(rows: Bytes, packets: Sequence[Packet]) -> NDArray[np.bool_]:
-    """Which messages of the same length have the layout of the first one."""
+    """Flags of the messages that have the layout of the first one, among messages of the same length."""
     places = np.array([packet.place - k for packet in packets for k in (1, 2, 3)], dtype=np.int64)
     return np.asarray((rows[:, places] == rows[0, places]).all(axis=1))
 

@@ -69,7 +69,7 @@ class Optimal:
 
     @property
     def times_less_for_all(self) -> float:
-        """The same ratio if no parameter may be less certain."""
+        """The ratio of the times if no parameter may become less certain."""
         return self.standard.plan.duration_s / self.all_equal.plan.duration_s
 
     @property

@@ -144,7 +144,7 @@ class PlannedStage:
         return self._homed
 
     def stop(self) -> None:
-        """Nothing to stop."""
+        """Do nothing: a planned stage does not move."""
 
     @property
     def limits(self) -> tuple[float, float]:

@@ -18,7 +18,7 @@ def stops(bench: Bench) -> list[str]:
 
 
 def storage(plan: Plan, free_bytes: int) -> str:
-    """What a run stores, and whether the disk of the record has room for it."""
+    """The size of a run's data, and whether the disk of the record has room for it."""
     lacking = "" if free_bytes > plan.bytes else ": not enough space"
     return f"{size(plan.bytes)} on the disk; {size(free_bytes)} are free{lacking}"
 

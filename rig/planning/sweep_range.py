@@ -43,7 +43,7 @@ def columns(planned: Plan, data: Table) -> dict[str, Array]:
 
 
 def _dwell_s(settings: Mapping[str, Any], path: str) -> float:
-    """How long a pose is recorded: blocks of a hold, else dwells."""
+    """Recording time of a pose: all blocks of a hold, or one dwell."""
     return float(settings["block_s" if path.startswith("hold") and "block_s" in settings else "dwell_s"])
 
 
@@ -82,7 +82,7 @@ class JudgedPlan:
 
     @property
     def dwell_s(self) -> float:
-        """Of each pose."""
+        """Recording time of each pose."""
         return float(self.plan.settings["dwell_s"])
 
     @property
@@ -136,7 +136,7 @@ class Range:
 
     @property
     def places(self) -> Array:
-        """Where the candidates are, for distances: gravity in the sensor's frame, and the side of the approach."""
+        """Coordinates of the candidates, for distances: gravity in the sensor's frame, and the side of the approach."""
         table = self._candidate_table
         return np.column_stack([reported_force(table), SIDE * table.column("direction")])
 
@@ -160,7 +160,7 @@ class Range:
 
     @cached_property
     def _candidate_table(self) -> Table:
-        """Of the candidates, in no order; at one time where the model needs a time."""
+        """Table of the candidates, in no order; all at one time where the model needs a time."""
         columns = _pose_columns(self.candidates)
         if any("t_s" in term.effect.needs for term in self.fit.model.terms):
             columns["t_s"] = np.full(len(self.candidates), self._plan.duration_s / 2)
@@ -189,7 +189,7 @@ def _fill_gaps(angles_deg: Iterable[float]) -> list[float]:
 
 
 def _columns(planned: Plan) -> dict[str, Array]:
-    """Of the poses that a plan holds, in order, with their times and dwells."""
+    """Columns of the planned poses, in order, with their times and dwells."""
     dwell_s = float(planned.settings["dwell_s"])
     columns = _pose_columns([dwell.pose for dwell in planned.held])
     columns["t_s"] = np.array([dwell.start_s + dwell_s / 2 for dwell in planned.held])

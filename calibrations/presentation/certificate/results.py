@@ -234,14 +234,14 @@ def _explain_wider_interval(k: int, coverage: float, std: float, simulated: floa
 
 
 def _weights(fit: Fit) -> Array:
-    """By what share each row makes up the square of each parameter's sensitivities to the means, shape (p, n)."""
+    """Share of each row in the square of each parameter's sensitivities to the means, shape (p, n)."""
     squares = np.sum(row_gains(fit.in_all_noise()) ** 2, axis=1)
     total = squares.sum(axis=1, keepdims=True)
     return np.asarray(squares / np.where(total > 0, total, 1.0))
 
 
 def _errors(fit: Fit, earlier_model: Model | None) -> Iterator[Error]:
-    """In thousandths of the sensed quantity, by channel; as found, if the earlier model has every needed value."""
+    """Errors by channel, in thousandths of the sensed quantity; as found, if the earlier model has all values."""
     earlier = None if earlier_model is None else evaluate(earlier_model, fit.table)
     for c, channel in enumerate(fit.channels):
         as_found = None if earlier is None else _size(earlier, c, fit)

@@ -143,7 +143,7 @@ def _results(c: Certificate) -> Section:
 
 
 def _as_found_section(c: Certificate) -> Section:
-    """As found, where an earlier calibration is known; the error of indication in any case."""
+    """The results as found, if an earlier calibration is known; the error of indication in any case."""
     outcomes = [o for o in c.figures.outcomes if o.found is not None]
     changes = tuple(
         (_name(o), value_text(o.found[0], o.expanded), value_text(o.value, o.expanded),

@@ -173,7 +173,7 @@ def notable_steps(discovery: Discovery[Fit]) -> tuple[Step[Fit], ...]:
 
 
 def _fall(step: Step[Fit]) -> float:
-    """By which factor the error falls."""
+    """The factor by which a step reduces the error."""
     return step.before.pooled_excess / step.after.pooled_excess
 
 

@@ -268,7 +268,7 @@ def _are_one_curve(end: NoiseFit, start: NoiseFit) -> bool:
 
 
 def _name(end: NoiseFit, start: NoiseFit) -> str:
-    """Of the final model: the given one may have its name and other values, or another record."""
+    """Name of the final model; the start may have the same name with other values or another record."""
     if end.model.name != start.model.name or _are_one_curve(end, start):
         return end.model.name
     return f"{end.model.name}, {LESS if end.still is not start.still else 'fitted'}"
@@ -345,7 +345,7 @@ def whole_steps(first_s: float, last_s: float, rate_hz: float) -> Array:
 
 
 def root(two_sided: Array) -> Array:
-    """One-sided amplitude density."""
+    """One-sided amplitude density from a two-sided power density."""
     return np.asarray(np.sqrt(2 * two_sided))
 
 

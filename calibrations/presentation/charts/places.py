@@ -162,7 +162,7 @@ def curve_panel(curve: PlaceCurve, axis: str, forms: Sequence[FittedForm] = ()) 
 
 
 def shares_chart(steps: Falling) -> Chart:
-    """For each model the part of the first model's excess variance that it leaves, divided among the places."""
+    """For each model, the part of the first model's excess variance that remains, divided among the places."""
     names, shares = shares_by_place(steps)
     rows = len(shares)
     ends = np.cumsum(shares, axis=1)

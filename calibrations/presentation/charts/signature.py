@@ -256,7 +256,7 @@ def rate_parts(effect: Effect) -> list[Part]:
 
 
 def _curves(n: int) -> Iterator[Curve]:
-    """One for each edge that is turned about."""
+    """The curves, one for each edge that the sensor turns about."""
     for k, (axis, colour) in enumerate(zip(AXES, COLOURS, strict=True)):
         yield Curve(f"about {axis}", colour, "-", np.arange(k * n, (k + 1) * n))
 

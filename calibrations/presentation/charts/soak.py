@@ -153,7 +153,7 @@ def allan(soak: Soak) -> Chart:
 
 
 def _course(soak: Soak, course: Course, factor: float, label: str, title: str = "") -> Panel:
-    """One quantity as change from its final value, times `factor`."""
+    """A panel with one quantity as the change from its final value, times `factor`."""
     state, final, colour = course.state, _final(course), COLOURS[course.axis]
     series: list[Series] = list(_gaps(soak))
     if course.quantity == "bias":

@@ -88,7 +88,7 @@ def next_words(e: Experiment) -> str:
 
 
 def next_takes(e: Experiment) -> str:
-    """Its duration and its probability of success, if known."""
+    """Duration of an experiment and its probability of success, if known."""
     if e.duration_s is None:
         return ""
     minutes = e.duration_s / 60

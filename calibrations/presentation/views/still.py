@@ -123,7 +123,7 @@ class StillView(View[NoiseFit]):
 
 
 def gains(discovery: Discovery[NoiseFit]) -> Iterator[tuple[str, float | None, float | None, NoiseFit]]:
-    """By model: name, log-likelihood gained over the row above, log-likelihood lost without the effect alone, fit.
+    """For each model: name, log-likelihood gained over the row above, and lost without this effect alone, fit.
 
     Gains add up; losses do not. None where there is nothing to compare with.
     """
@@ -136,7 +136,7 @@ def gains(discovery: Discovery[NoiseFit]) -> Iterator[tuple[str, float | None, f
 
 
 def _row(name: str, gained: float | None, loss: float | None, fit: NoiseFit) -> tuple[str, ...]:
-    """In the order of HEAD."""
+    """Cells of one row, in the order of HEAD."""
     off = ", ".join(f"{100 * value:.3g} %" for value in mismatch(fit).values())
     texts = ["" if value is None else f"{value:+.5g}" for value in (gained, None if loss is None else -loss)]
     return name, *texts, f"{fit.pooled_excess:.2f}", f"{fit.held_out_excess:.2f}", off

@@ -259,7 +259,7 @@ class _Answer:
         }
 
     def text(self, whole_text: bool) -> str:
-        """For a terminal; of a still record only the short form, or with `whole_text` all of it."""
+        """Text for a terminal; of a still record only the short form, or all of it with `whole_text`."""
         from rig.cli.terminal.words import discovery, parameters, pattern_advice, short_discovery
 
         data = self.discovery.findings.data

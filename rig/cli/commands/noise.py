@@ -86,7 +86,7 @@ def _record(data: str, channel: str | None, rate_hz: float | None, tau_s: tuple[
 
 
 def rounded_times(tau_s: Iterable[float], analysis: NoiseAnalysis) -> Iterable[str]:
-    """Which of the given averaging times are not whole numbers of samples."""
+    """Notes on averaging times that are not whole numbers of samples."""
     taken_s = next(iter(analysis.channels.values())).allan.tau_s.tolist()
     for requested_s, used in zip(tau_s, taken_s, strict=False):
         if not np.isclose(requested_s, used):

@@ -187,7 +187,7 @@ def _document(planned: Plan) -> dict[str, object]:
 
 
 def optimal_lines(optimum: Optimal, out: str | None, bench: str | None = None) -> Iterator[str]:
-    """In words; `out` is the file of the poses, `bench` the bench file."""
+    """The optimum in words; `out` is the file of the poses, `bench` the bench file."""
     model, count = optimum.over.fit.model.name, len(optimum.over.fit.theta)
     yield f"{model}, {count} parameters: {optimum.criterion}-optimal poses in the range of the standard sweep"
     yield ""
