@@ -6,7 +6,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ from drivers.digital.settings import FIELDS, FORCES, RATES, VOLTAGES, DigitalSet
 from drivers.transport.address import Address
 from drivers.transport.faults import Faults, Kind
 from drivers.transport.server import Connection, Port, Server, Twin
+
+if TYPE_CHECKING:
+    from drivers.world.world import World
 
 Floats = NDArray[np.float64]
 G_M_S2 = 9.80665
@@ -45,14 +48,6 @@ FRAME_FAULTS = {  # of a sensor that sends frames when they are requested
 }
 
 
-class World(Protocol):
-    """The part of the simulated world that a sensor uses."""
-
-    def sensed(self, outputs: Sequence[str], start_s: float, interval_s: float, n: int) -> Floats: ...
-    def die_c(self) -> float: ...
-
-
-W = TypeVar("W", bound=World)
 S = TypeVar("S", bound=DigitalSettings)
 
 
@@ -229,7 +224,7 @@ def sending_port(listen: str) -> Port:
 
 
 def serve_sensors(
-    sensor: Callable[[W, S, Port], DigitalTwin], world: W, roles: Mapping[str, tuple[int, S]], listen: str
+    sensor: Callable[[World, S, Port], DigitalTwin], world: World, roles: Mapping[str, tuple[int, S]], listen: str
 ) -> Server:
     """A link with a sensor for each role: role -> (unit id, not used by such a sensor; settings)."""
     ports = {role: sending_port(listen) for role in roles}

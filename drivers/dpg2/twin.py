@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from drivers.dpg2.driver import ONE_READING, STOP, VERSION, Settings
 from drivers.transport.address import Address
 from drivers.transport.faults import Faults, Kind
 from drivers.transport.server import Connection, Port, Server, Twin
+
+if TYPE_CHECKING:
+    from drivers.world.batch import AnyWorld
 
 LISTEN = "pty:?baud=9600"
 FAULTS = {
@@ -25,21 +28,10 @@ START = b"S"
 IDENTITY = b"DPL2 V1.8.0\r\nSN:123456789\r\n"
 
 
-class World(Protocol):
-    """The part of the simulated world that a level uses."""
-
-    @property
-    def now_s(self) -> float: ...
-
-    def advance(self, t_s: float) -> None: ...
-
-    def level_deg(self) -> tuple[float, float]: ...
-
-
 class Inclinometer(Twin):
     """One level on a line of its own. It sends from power-on; bytes into an open or a full line are lost."""
 
-    def __init__(self, world: World, settings: Settings, port: Port) -> None:
+    def __init__(self, world: AnyWorld, settings: Settings, port: Port) -> None:
         self.faults = Faults()
         self._world, self._range_deg, self._port = world, settings.range_deg, port
         self._running, self._next_s = True, 0.0
@@ -123,7 +115,7 @@ class LevelServer(Server):
         super().emit(now_s)
 
 
-def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> LevelServer:
+def serve(world: AnyWorld, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> LevelServer:
     """A line with a level for each role: role -> (unit id, not used by such a level; settings)."""
     ports = {role: Port(listen) for role in roles}
     return LevelServer(ports, {role: Inclinometer(world, roles[role][1], port) for role, port in ports.items()})

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Protocol
-
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from drivers.epics_adc.driver import Settings
 from drivers.transport.address import Address
 from drivers.transport.channel_access_server import Field, records_port
 from drivers.transport.faults import Faults, Kind
 from drivers.transport.server import Server, Twin
+
+if TYPE_CHECKING:
+    from drivers.world.batch import AnyWorld
 
 __all__ = ["FAULTS", "LISTEN", "serve"]
 
@@ -26,18 +26,10 @@ FAULTS = {
 }
 
 
-class World(Protocol):
-    """The part of the simulated world that a converter uses."""
-
-    def advance(self, t_s: float) -> None: ...
-
-    def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]: ...
-
-
 class Ioc(Twin):
     """The records by name. All are processed at the same time."""
 
-    def __init__(self, world: World, settings: Settings) -> None:
+    def __init__(self, world: AnyWorld, settings: Settings) -> None:
         self.faults = Faults()
         self._world = world
         self._wiring = {f"{BEGINNING}{record}": name for name, record in settings.wired.items()}
@@ -64,7 +56,7 @@ class Ioc(Twin):
         self._volts, self._stamp_s = dict(zip(names, map(float, volts), strict=True)), now_s
 
 
-def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
+def serve(world: AnyWorld, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
     """One IOC: role -> (unit id, not used by an IOC; settings). Its channels are the world's inputs."""
     ((role, (unit, settings)),) = roles.items()
     ioc = Ioc(world, settings)

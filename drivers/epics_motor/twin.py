@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from drivers.epics_motor import fields as mr
 from drivers.epics_motor.driver import Settings
@@ -14,6 +14,9 @@ from drivers.transport.channel_access_server import Field, records_port
 from drivers.transport.faults import Faults, Kind
 from drivers.transport.server import Server, Twin
 from drivers.world.stage import Trajectory, at_rest
+
+if TYPE_CHECKING:
+    from drivers.world.batch import AnyWorld
 
 __all__ = ["FAULTS", "LISTEN", "serve"]
 
@@ -32,20 +35,10 @@ FAULTS = {
 BRAKES = ("stopped", "limit-switch")
 
 
-class World(Protocol):
-    """The part of the simulated world that a motor moves."""
-
-    def advance(self, t_s: float) -> None: ...
-
-    def motor_angle_deg(self, axis: str) -> float: ...
-
-    def move_stage(self, axis: str, trajectory: Trajectory) -> None: ...
-
-
 class Motor(Twin):
     """A motor record that turns the world's `axis`; its units are deg."""
 
-    def __init__(self, world: World, axis: str, settings: Settings) -> None:
+    def __init__(self, world: AnyWorld, axis: str, settings: Settings) -> None:
         self.faults = Faults()
         self._world, self._axis, self._name = world, axis, f"{BEGINNING}{axis}"
         low, high = settings.limits_deg
@@ -137,7 +130,7 @@ class Motor(Twin):
         return self._world.motor_angle_deg(self._axis)
 
 
-def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
+def serve(world: AnyWorld, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
     """One IOC with a motor record for each role: role -> (unit id, settings). The role is the world's axis."""
     motors = {role: Motor(world, role, settings) for role, (_, settings) in roles.items()}
     port = records_port(listen, list(motors.values()))

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.digital.settings import FIELDS, FORCES, RATES, TEMPERATURE, VOLTAGES
-from drivers.digital.twin import DigitalTwin, Floats, World, common_faults, serve_sensors
+from drivers.digital.twin import DigitalTwin, Floats, common_faults, serve_sensors
 from drivers.imu_lines.driver import WRAP, Settings
 from drivers.imu_lines.lines import TIME, checksum
 from drivers.transport.server import Port, Server
+
+if TYPE_CHECKING:
+    from drivers.world.world import World
 
 LISTEN = "pty:?baud=115200"
 FAULTS = common_faults("line")

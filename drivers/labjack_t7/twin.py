@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,9 @@ from drivers.transport.modbus_server import (
 )
 from drivers.transport.server import Port, Server, Twin
 from drivers.world.kernel import kernel
+
+if TYPE_CHECKING:
+    from drivers.world.batch import AnyWorld
 
 # What can be wrong with the simulated T7's stream.
 
@@ -94,20 +97,10 @@ FLASH_BYTES = struct.pack(">41f", *_CONSTANTS, *_CONSTANTS, *(13200.0, 300.0) * 
 FLASH_WORDS = struct.unpack(">82H", FLASH_BYTES)
 
 
-class World(Protocol):
-    """The physics that a converter measures."""
-
-    def advance(self, t_s: float) -> None: ...
-
-    def power(self, on: bool) -> None: ...
-
-    def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]: ...
-
-
 class Inputs:
     """The analog inputs: their connections to the world, and the converter behind them."""
 
-    def __init__(self, world: World, wiring: Mapping[int, str]) -> None:
+    def __init__(self, world: AnyWorld, wiring: Mapping[int, str]) -> None:
         self._world, self._wiring = world, wiring
 
     def codes(
@@ -200,7 +193,7 @@ class Converter(Twin):
     functions = frozenset({3, 4, 6, 16})
     thinking_s = THINKING_S
 
-    def __init__(self, world: World, settings: Settings, stream_port: Port) -> None:
+    def __init__(self, world: AnyWorld, settings: Settings, stream_port: Port) -> None:
         self.faults = Faults()
         self.ports = [stream_port]
         self._world, self._power_dio, self._port = world, settings.power_dio, stream_port
@@ -349,7 +342,7 @@ def _initial_words() -> dict[int, int]:
     return {r.address + i: word for r, value in values.items() for i, word in enumerate(r.encode(value))}
 
 
-def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
+def serve(world: AnyWorld, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
     """One device: role -> (unit id, settings). Its channels' names are the world's inputs that they are wired to."""
     ((role, (unit, settings)),) = roles.items()
     stream = Port(LISTEN)

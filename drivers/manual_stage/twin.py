@@ -6,7 +6,7 @@ It serves nothing: its wire is a person, so whoever answers for the simulated te
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from drivers.transport.address import Address
 from drivers.transport.person import PERSON
 from drivers.transport.server import Server
 from drivers.world.stage import Trajectory
+
+if TYPE_CHECKING:
+    from drivers.world.batch import AnyWorld
 
 LISTEN = PERSON
 TURNING_DEG_S = 30.0
@@ -25,21 +28,10 @@ READING_STD = 0.1  # of a mark: standard deviation of telling which is nearest
 NANO = 1e-9
 
 
-class World(Protocol):
-    """The part of the simulated world that a hand uses."""
-
-    @property
-    def now_s(self) -> float: ...
-
-    def motor_angle_deg(self, axis: str) -> float: ...
-
-    def move_stage(self, axis: str, trajectory: Trajectory) -> None: ...
-
-
 class Hand:
     """The simulated hand at the world's `axis`. Its actions depend on `seed`, time and angle only: they repeat."""
 
-    def __init__(self, world: World, axis: str, settings: Settings, seed: int) -> None:
+    def __init__(self, world: AnyWorld, axis: str, settings: Settings, seed: int) -> None:
         self._world, self._axis, self._mark_deg, self._seed = world, axis, settings.resolution_deg, seed
 
     def turn_to(self, angle_deg: float) -> Trajectory | None:
@@ -64,6 +56,6 @@ class Hand:
         return float(np.random.default_rng([self._seed, abs(round(place / NANO)), len(self._axis)]).standard_normal())
 
 
-def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:  # noqa: ARG001
+def serve(world: AnyWorld, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:  # noqa: ARG001
     """Serves no port: the address of each role is that of a person."""
     return Server([], {}, {role: Address(PERSON) for role in roles})

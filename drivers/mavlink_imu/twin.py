@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.digital.frames import Frames, Ints
 from drivers.digital.settings import OUTPUTS
-from drivers.digital.twin import FRAME_FAULTS, Floats, FramedTwin, World, common_faults, serve_sensors
+from drivers.digital.twin import FRAME_FAULTS, Floats, FramedTwin, common_faults, serve_sensors
 from drivers.mavlink_imu import messages as mav
 from drivers.mavlink_imu.driver import END, NO_TEMPERATURE, UPDATE_BITS, WARM, Settings
 from drivers.transport.faults import Kind
 from drivers.transport.server import Connection, Port, Server
+
+if TYPE_CHECKING:
+    from drivers.world.world import World
 
 LISTEN = "tcp://127.0.0.1:0"
 SYSTEM, COMPONENT, QUADROTOR, PX4 = 1, 1, 2, 12

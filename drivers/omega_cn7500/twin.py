@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from drivers.omega_cn7500.driver import CONTROL_METHOD, PROCESS_VALUE, RUN_BIT, SET_POINT, Settings
 from drivers.transport.address import Address
 from drivers.transport.faults import Faults, Kind
 from drivers.transport.modbus_server import ILLEGAL_ADDRESS, MODBUS_FAULTS, Refusal, modbus_port
 from drivers.transport.server import Server, Twin
+
+if TYPE_CHECKING:
+    from drivers.world.batch import AnyWorld
 
 LISTEN = "pty:?baud=9600"
 FAULTS = {
@@ -26,23 +29,13 @@ FULL_C = 1000.0  # a set point that takes all power
 THINKING_S = 0.005
 
 
-class World(Protocol):
-    """The physics that a temperature controller acts on."""
-
-    def advance(self, t_s: float) -> None: ...
-
-    def oven_set(self, set_point_c: float, running: bool) -> None: ...
-
-    def thermometer_c(self) -> float: ...
-
-
 class Controller(Twin):
     """One unit. Wakes stopped, with a set point of 25 C."""
 
     functions = frozenset({2, 3, 5, 6})
     thinking_s = THINKING_S
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: AnyWorld) -> None:
         self.faults = Faults()
         self._world = world
         self._set_point_c, self._running = POWER_ON_STATE
@@ -111,7 +104,7 @@ class Controller(Twin):
         return self._set_point_c
 
 
-def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
+def serve(world: AnyWorld, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
     """One bus with a controller for each role: role -> (unit id, settings)."""
     controllers = {role: Controller(world) for role in roles}
     port = modbus_port(listen, {roles[role][0]: controller for role, controller in controllers.items()})

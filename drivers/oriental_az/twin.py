@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from drivers.oriental_az import registers as az
 from drivers.oriental_az.driver import Settings
@@ -15,6 +15,9 @@ from drivers.transport.modbus import Register
 from drivers.transport.modbus_server import MODBUS_FAULTS, modbus_port
 from drivers.transport.server import Server, Twin
 from drivers.world.stage import Trajectory, at_rest
+
+if TYPE_CHECKING:
+    from drivers.world.batch import AnyWorld
 
 LISTEN = "pty:"
 HOMING_DEG_S = 20.0
@@ -34,23 +37,13 @@ FAULTS = {
 TRIGGERS = dict(zip(range(-7, 0), (r.address for r in az.DIRECT[:-1]), strict=True))  # trigger -> starting item
 
 
-class World(Protocol):
-    """The part of the simulated world that a drive moves."""
-
-    def advance(self, t_s: float) -> None: ...
-
-    def motor_angle_deg(self, axis: str) -> float: ...
-
-    def move_stage(self, axis: str, trajectory: Trajectory) -> None: ...
-
-
 class Drive(Twin):
     """One unit of the bus, turning the world's `axis`. Wakes without coordinates: it must be homed."""
 
     functions = frozenset({3, 6, 16, 23})
     thinking_s = THINKING_S
 
-    def __init__(self, world: World, axis: str, settings: Settings) -> None:
+    def __init__(self, world: AnyWorld, axis: str, settings: Settings) -> None:
         self.faults = Faults()
         self._world, self._axis = world, axis
         self._steps_per_deg = settings.steps_per_turn / 360
@@ -219,7 +212,7 @@ class Drive(Twin):
         return self._world.motor_angle_deg(self._axis)
 
 
-def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
+def serve(world: AnyWorld, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
     """One bus with a drive for each role: role -> (unit id, settings). The role is the world's axis."""
     drives = {role: Drive(world, role, settings) for role, (_, settings) in roles.items()}
     port = modbus_port(listen, {roles[role][0]: drive for role, drive in drives.items()})

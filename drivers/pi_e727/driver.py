@@ -64,8 +64,7 @@ class Settings:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Positions of one axis, measured by the controller from the start of the oscillation, `position_um` (n,).
-"""
+    """Positions of one axis, measured by the controller from the start of the oscillation, `position_um` (n,)."""
 
     position_um: NDArray[np.float64]
     interval_s: float

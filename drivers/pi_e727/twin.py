@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from drivers.pi_e727 import parameters as e727
 from drivers.pi_e727.driver import Settings
-from drivers.pi_e727.twin_axes import CYCLE_S, Axes, Handler, World
+from drivers.pi_e727.twin_axes import CYCLE_S, Axes, Handler
 from drivers.pi_e727.twin_waves import Recorder, Waves
 from drivers.transport.address import Address
 from drivers.transport.faults import Faults, Kind
@@ -23,6 +23,9 @@ from drivers.transport.gcs_server import (
     parse_integer,
 )
 from drivers.transport.server import Server, Twin
+
+if TYPE_CHECKING:
+    from drivers.world.batch import AnyWorld
 
 LISTEN = "tcp://127.0.0.1:0"
 FAULTS = {
@@ -43,7 +46,7 @@ PARAMETERS = {  # identifier: (value, type, name), the same for every axis
 class Controller(Twin):
     """One controller. It stores one error and clears it when it is read."""
 
-    def __init__(self, world: World, settings: Settings) -> None:
+    def __init__(self, world: AnyWorld, settings: Settings) -> None:
         self._axes = Axes(world, settings.axes)
         self._power_on()
 
@@ -157,7 +160,7 @@ def _hexadecimal(on: Iterable[bool]) -> str:
     return f"{sum(1 << k for k, flag in enumerate(on) if flag):X}"
 
 
-def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
+def serve(world: AnyWorld, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
     """One controller: role -> (unit id, settings). Its axes' names are the world's."""
     ((role, (unit, settings)),) = roles.items()
     controller = Controller(world, settings)

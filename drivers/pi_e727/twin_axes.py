@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
@@ -15,6 +15,9 @@ from drivers.transport.gcs_server import OUT_OF_RANGE, Refusal, groups, number, 
 from drivers.world.kernel import Floats
 from drivers.world.positioner import Command, hold_command
 
+if TYPE_CHECKING:
+    from drivers.world.batch import AnyWorld
+
 TRAVEL_UM = (0.0, 100.0)  # of the P-611.3S in closed loop
 CYCLE_S = 50e-6  # of the servo
 VELOCITY_UM_S = 1000.0  # of the command's ramp to a new place [M]
@@ -22,22 +25,10 @@ VELOCITY_UM_S = 1000.0  # of the command's ramp to a new place [M]
 Handler = Callable[[Sequence[str], float], str | None]
 
 
-class World(Protocol):
-    """The interface of a controller to the simulated physics."""
-
-    def advance(self, t_s: float) -> None: ...
-
-    def move_positioner(self, axis: str, command: Command) -> float:
-        """Let the carriage follow a command from now on; when it will have settled, in s."""
-
-    def positioner_um(self, axis: str, times_s: ArrayLike) -> Floats:
-        """The reading of the position sensor, from the start of the present command on; no time passes."""
-
-
 class Axes:
     """Axes by the controller's identifier. They wake with the servo off, wherever they are."""
 
-    def __init__(self, world: World, names: Mapping[str, str]) -> None:
+    def __init__(self, world: AnyWorld, names: Mapping[str, str]) -> None:
         self.faults = Faults()
         self._world = world
         self._names = {axis: name for name, axis in names.items()}

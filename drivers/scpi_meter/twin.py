@@ -6,7 +6,7 @@ import math
 import re
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ from drivers.scpi_meter.driver import Settings
 from drivers.transport.address import Address
 from drivers.transport.faults import Faults, Kind
 from drivers.transport.server import Connection, Port, Server, Twin
+
+if TYPE_CHECKING:
+    from drivers.world.batch import AnyWorld
 
 __all__ = ["FAULTS", "LISTEN", "serve"]
 
@@ -34,18 +37,10 @@ TEXTS = {-113: "Undefined header", -222: "Data out of range", -350: "Queue overf
 LIST = re.compile(r"\(@([\d,]+)\)")
 
 
-class World(Protocol):
-    """The interface of a converter to the simulated physics."""
-
-    def advance(self, t_s: float) -> None: ...
-
-    def adc_volts(self, inputs: Sequence[str], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]: ...
-
-
 class Scanner(Twin):
     """The instrument behind its line. An input that is wired to nothing reads 0 V."""
 
-    def __init__(self, world: World, settings: Settings) -> None:
+    def __init__(self, world: AnyWorld, settings: Settings) -> None:
         self.faults = Faults()
         self._world, self._wiring = world, {number: name for name, number in settings.wired.items()}
         self._errors: deque[int] = deque()
@@ -174,7 +169,7 @@ def _port(listen: str, scanner: Scanner) -> Port:
     return port
 
 
-def serve(world: World, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
+def serve(world: AnyWorld, roles: Mapping[str, tuple[int, Settings]], listen: str = LISTEN) -> Server:
     """One instrument: role -> (unit id, which it has not, settings). Its channels are the world's inputs."""
     ((role, (_, settings)),) = roles.items()
     scanner = Scanner(world, settings)

@@ -124,6 +124,9 @@ class Batch:
         return sensor if dot else next(iter(self._worlds))
 
 
+AnyWorld = World | Batch  # what simulated instruments act on: one sensor, or several on one table
+
+
 def with_own(config: WorldConfig, name: str, changes: Mapping[str, Any]) -> WorldConfig:
     """The settings of one sensor's world. Raises BadSetting for a change of something that all sensors share."""
     if shared := [key for key in changes if key not in SENSOR_PARTS]:

@@ -176,8 +176,7 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
         self._await_temperature()
 
     def _await_temperature(self) -> None:
-        """Wait for the temperature before the first record: it comes once a second, and each record needs one.
-"""
+        """Wait for the temperature before the first record: it comes once a second, and each record needs one."""
         if self._warmth.awaited:
             return
         self._warmth.awaited = True

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.digital.frames import Frames
 from drivers.digital.settings import FIELDS
-from drivers.digital.twin import FRAME_FAULTS, Floats, FramedTwin, World, common_faults, serve_sensors
+from drivers.digital.twin import FRAME_FAULTS, Floats, FramedTwin, common_faults, serve_sensors
 from drivers.transport.faults import Kind
 from drivers.transport.server import Connection, Port, Server
 from drivers.xsens_mti import messages as xbus
 from drivers.xsens_mti.driver import TICK_S, TRIADS, Settings
+
+if TYPE_CHECKING:
+    from drivers.world.world import World
 
 LISTEN = "pty:?baud=921600"
 SERIAL, PRODUCT, FIRMWARE = 0x0370_03F8, b"MTi-30-2A8G4        ", bytes([1, 8, 2])

@@ -18,8 +18,7 @@ from drivers.manual_stage.driver import ManualStage
 from drivers.transport.link import Tap
 from drivers.transport.person import PersonLink
 from drivers.transport.server import Server
-from drivers.world.batch import Batch
-from drivers.world.world import World
+from drivers.world.batch import AnyWorld
 from procedures.errors import ProcedureError
 from procedures.instruments import Oven, Stage
 from procedures.questions import Dial
@@ -85,7 +84,7 @@ class Rig:
     bench: Bench
     drivers: Mapping[str, Driver]
     clock: GuardedClock
-    world: World | Batch | None  # of the simulated instruments
+    world: AnyWorld | None  # of the simulated instruments
     servers: tuple[Server, ...]
     person: PersonLink
 

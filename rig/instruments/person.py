@@ -9,8 +9,7 @@ from functools import singledispatch
 
 from drivers.handheld.world import HandheldWorld
 from drivers.manual_stage.twin import Hand
-from drivers.world.batch import Batch
-from drivers.world.world import World
+from drivers.world.batch import AnyWorld
 from procedures.questions import Choice, Confirm, Dial, Mounting, Number, PowerCycle, Question, Remount
 from procedures.session import Guidance
 from rig.instruments.instruments import Rig
@@ -32,35 +31,35 @@ def follow(guidance: Guidance, rig: Rig) -> None:
 
 
 @singledispatch
-def _do_work(question: Question, rig: Rig, world: World | Batch) -> str | None:  # noqa: ARG001
+def _do_work(question: Question, rig: Rig, world: AnyWorld) -> str | None:  # noqa: ARG001
     """Do the work, and answer. Each kind of question has its own function."""
     return None
 
 
 @_do_work.register
-def _(question: Confirm, rig: Rig, world: World | Batch) -> str:  # noqa: ARG001
+def _(question: Confirm, rig: Rig, world: AnyWorld) -> str:  # noqa: ARG001
     return "yes"
 
 
 @_do_work.register
-def _(question: Choice, rig: Rig, world: World | Batch) -> str:  # noqa: ARG001
+def _(question: Choice, rig: Rig, world: AnyWorld) -> str:  # noqa: ARG001
     return question.choices[0]
 
 
 @_do_work.register
-def _(question: Mounting, rig: Rig, world: World | Batch) -> str:  # noqa: ARG001
+def _(question: Mounting, rig: Rig, world: AnyWorld) -> str:  # noqa: ARG001
     world.mount_sensor(question.mount_deg, question.flip, question.up)
     return "yes"
 
 
 @_do_work.register
-def _(question: Remount, rig: Rig, world: World | Batch) -> str:  # noqa: ARG001
+def _(question: Remount, rig: Rig, world: AnyWorld) -> str:  # noqa: ARG001
     world.mount_sensor()
     return "yes"
 
 
 @_do_work.register
-def _(question: PowerCycle, rig: Rig, world: World | Batch) -> str:
+def _(question: PowerCycle, rig: Rig, world: AnyWorld) -> str:
     world.power(False)
     rig.clock.sleep(question.off_s)
     world.advance(rig.clock.now())
@@ -69,7 +68,7 @@ def _(question: PowerCycle, rig: Rig, world: World | Batch) -> str:
 
 
 @_do_work.register
-def _(question: Number, rig: Rig, world: World | Batch) -> str | None:  # noqa: ARG001
+def _(question: Number, rig: Rig, world: AnyWorld) -> str | None:  # noqa: ARG001
     if not question.name.startswith("level-"):
         return None
     x_deg, y_deg = world.level_deg()
@@ -77,7 +76,7 @@ def _(question: Number, rig: Rig, world: World | Batch) -> str | None:  # noqa: 
 
 
 @_do_work.register
-def _(question: Dial, rig: Rig, world: World | Batch) -> str:
+def _(question: Dial, rig: Rig, world: AnyWorld) -> str:
     """Turn the stage if needed, which takes time, and read the dial."""
     settings = rig.bench.instruments[question.stage].parse_settings()
     hand = Hand(world, question.stage, settings, rig.bench.seed)

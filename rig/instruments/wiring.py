@@ -25,7 +25,7 @@ from drivers.transport.faults import faults_of
 from drivers.transport.link import Tap
 from drivers.transport.person import PERSON
 from drivers.transport.server import Server
-from drivers.world.batch import Batch
+from drivers.world.batch import AnyWorld, Batch
 from drivers.world.config import WorldConfig
 from drivers.world.world import World
 from rig.bench import Bench
@@ -43,7 +43,7 @@ class Wiring:
     bench: Bench
     clock: GuardedClock
     links: Links
-    world: World | Batch
+    world: AnyWorld
     servers: Mapping[str, Server]
 
     def connect(self, role: str) -> Driver:
@@ -93,7 +93,7 @@ def on_a_network(bench: Bench) -> list[str]:
     return [role for role, part in real_instruments.items() if Url.parse(part.url).on_a_network]
 
 
-def world_of(bench: Bench) -> World | Batch:
+def world_of(bench: Bench) -> AnyWorld:
     """The simulated world of the bench file, with every sensor of a batch, or with a sensor in a hand."""
     settings, hand = handheld(bench.world)
     config = WorldConfig.from_mapping(settings)
@@ -104,7 +104,7 @@ def world_of(bench: Bench) -> World | Batch:
     return Batch(config, bench.seed, {name: sensor.world for name, sensor in bench.sensors.items()})
 
 
-def serve(bench: Bench, world: World | Batch) -> dict[str, Server]:
+def serve(bench: Bench, world: AnyWorld) -> dict[str, Server]:
     """The servers of all simulated instruments, by their roles: one server for each wire."""
     wires = defaultdict(list)
     for role, instrument in bench.instruments.items():
