@@ -10,19 +10,17 @@ Source: EPICS motor record documentation (epics-modules/motor), field descriptio
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 from drivers.epics_motor import fields as mr
 from drivers.epics_motor.fields import Settings
-from drivers.errors import DriverError, Interlocked, LimitError, NotSettled, StageAlarm, StageLost
-from drivers.instrument import OUTSIDE_ANGLE, Check, Identity, require_within
-from drivers.paths import LEAD_S
+from drivers.errors import Interlocked, LimitError, NotSettled, StageAlarm, StageLost
+from drivers.instrument import Check, Identity
+from drivers.motor_stage import LEAD_S, MotorStage, Turn
 from drivers.transport import Address, Links
 from drivers.transport.channel_access import Reading, Records
 
-__all__ = ["MotorRecord", "Settings", "Turn", "connect"]
+__all__ = ["MotorRecord", "Settings", "connect"]
 
 POLL_S = 0.05
 BEGIN_S = 1.0  # until DMOV shows a move that was asked for
@@ -36,26 +34,15 @@ CLOSE = 1e-6  # relative, of speeds that are equal
 STATE = (mr.READBACK, mr.DONE, mr.STATUS, mr.MODE, mr.SET, mr.HIGH_SWITCH, mr.LOW_SWITCH)
 
 
-@dataclass(frozen=True)
-class Turn:
-    """A turn that goes on: its rate, and how often `require` has to be called meanwhile.
+class MotorRecord(MotorStage):
+    """A motor record as a stage."""
 
-    `require` raises StageAlarm, or NotSettled where the stage is not where it should be by now.
-    """
-
-    rate_deg_s: float
-    beat_s: float
-    require: Callable[[], None]
-
-
-class MotorRecord:
-    """A stage that is moved to angles in deg."""
+    settings: Settings
 
     def __init__(self, records: Records, links: Links, settings: Settings, name: str) -> None:
         """Raises LinkRefused for a record that is not there, LimitError where its units are not those of an angle."""
         self.name, self.settings = name, settings
         self._records, self._clock = records, links.clock
-        self._target_deg = math.nan  # of the last move; not a number after a stop
         self._expected_end_s = 0.0
         self._deg = 1.0
         self._records.read(*mr.FIELDS)
@@ -84,9 +71,6 @@ class MotorRecord:
             Check("position", True, f"{self._angle_deg(state):.4f} deg"),
         ]
 
-    def close(self) -> None:
-        """Does nothing: the bench closes the link."""
-
     def angle_deg(self) -> float:
         """The readback position, deg."""
         return self._angle_deg(self._read(mr.READBACK))
@@ -110,21 +94,6 @@ class MotorRecord:
                 "Check the home switch and `home` in the bench file, then resume the run",
             )
 
-    def move_to(self, angle_deg: float) -> None:
-        """Turn to `angle_deg`. Returns when the stage is at rest there.
-
-        Raises LimitError before anything is written, StageAlarm, Interlocked, NotSettled, the errors of the link.
-        """
-        self.start(angle_deg)
-        self.wait()
-
-    def start(self, angle_deg: float) -> None:
-        """Start turning to `angle_deg` and return at once. Raises LimitError before anything is written, StageAlarm,
-        Interlocked.
-        """
-        require_within(f"{self.name}: ", angle_deg, self.settings.limits_deg, "deg", OUTSIDE_ANGLE)
-        self._start(angle_deg, self.settings.speed_deg_s)
-
     def wait(self) -> None:
         """Wait until the started move has ended at its target. Raises StageAlarm, NotSettled."""
         if math.isnan(self._target_deg):
@@ -137,33 +106,6 @@ class MotorRecord:
             state = self._wait_until_done(PATIENCE_S, "is still moving")
         self._require_movable(state)
         self._require_at_target(state, "Remove what blocks the stage, check the load's balance, then resume the run")
-
-    def rate_deg_s(self, asked_deg_s: float) -> float:
-        """The rate as requested: the record takes any number."""
-        return self.settings.rate_deg_s(asked_deg_s)
-
-    @contextmanager
-    def turning(self, rate_deg_s: float, first_deg: float, last_deg: float) -> Iterator[Turn]:
-        """Turn from `first_deg` to `last_deg` at a constant rate, which it has when the body begins.
-
-        The stage is sent to an angle within its limits at that speed, where it ends by itself, whatever becomes of
-        this program. The body must call the turn's `require`. However it ends, the stage stands afterwards. Raises
-        LimitError before anything is written, StageAlarm, Interlocked, NotSettled.
-        """
-        start_deg, end_deg = self.settings.way_of_turn(self.name, rate_deg_s, first_deg, last_deg)
-        rate = math.copysign(rate_deg_s, last_deg - first_deg)
-        self.move_to(start_deg)
-        try:
-            self._start(end_deg, abs(rate))
-            ramp_s = abs(rate) / self.settings.acceleration_deg_s2
-            self._clock.sleep(ramp_s + LEAD_S)
-            at_s, at_deg = self._clock.now(), start_deg + rate * (ramp_s / 2 + LEAD_S)
-            yield Turn(rate, WATCH_S, lambda: self._require_turning(rate, at_deg, at_s))
-            self.wait()
-        except BaseException:
-            with suppress(DriverError):  # the first error is reported
-                self.stop()
-            raise
 
     def require_steady(self) -> None:
         """Compare the record with the last command; a stage without one passes. Raises StageAlarm, NotSettled."""
@@ -198,7 +140,7 @@ class MotorRecord:
                 raise NotSettled(f"{self.name}: has not stopped (DMOV is 0)", "Switch off its power")
             self._clock.sleep(POLL_S)
 
-    def _start(self, angle_deg: float, speed_deg_s: float) -> None:
+    def _start(self, angle_deg: float, speed_deg_s: float) -> float | None:
         state = self._read(*STATE, mr.TARGET, mr.LOW_LIMIT, mr.HIGH_LIMIT, mr.SPEED, mr.ACCELERATION_TIME)
         self._require_movable(state)
         low, high = self._record_limits_deg(state)
@@ -211,12 +153,20 @@ class MotorRecord:
         distance_deg = abs(angle_deg - self._angle_deg(state))
         self._target_deg, self._expected_end_s = angle_deg, self._clock.now()
         if state[mr.TARGET].value == angle_deg / self._deg and self._is_at_target(state):
-            return
+            return None
         ramp_s = speed_deg_s / self.settings.acceleration_deg_s2
         self._set(state, mr.SPEED, abs(speed_deg_s / self._deg))
         self._set(state, mr.ACCELERATION_TIME, ramp_s)
         self._records.written(mr.TARGET, angle_deg / self._deg)
-        self._expected_end_s += distance_deg / speed_deg_s + ramp_s
+        begun_s, self._expected_end_s = self._expected_end_s, self._expected_end_s + distance_deg / speed_deg_s + ramp_s
+        return begun_s
+
+    def _begin_turn(self, rate_deg_s: float, start_deg: float, end_deg: float) -> Turn:
+        self._start(end_deg, abs(rate_deg_s))
+        ramp_s = abs(rate_deg_s) / self.settings.acceleration_deg_s2
+        self._clock.sleep(ramp_s + LEAD_S)
+        at_s, at_deg = self._clock.now(), start_deg + rate_deg_s * (ramp_s / 2 + LEAD_S)
+        return Turn(rate_deg_s, WATCH_S, lambda: self._require_turning(rate_deg_s, at_deg, at_s))
 
     def _set(self, state: Mapping[str, Reading], field: str, value: float) -> None:
         """Write a field that has another value, and read it back: the record keeps it within limits of its own."""
@@ -261,11 +211,7 @@ class MotorRecord:
         if self._is_at_target(state):
             return
         cause = " (its own limits have stopped it, LVIO)" if self._records.read(mr.LIMIT_VIOLATION)[0].value else ""
-        raise NotSettled(
-            f"{self.name}: is at {self._angle_deg(state):.3f} deg instead of {self._target_deg:.3f} deg, "
-            f"more than {self.settings.settle_deg:g} deg away{cause}",
-            remedy,
-        )
+        raise self._away_from_target(self._angle_deg(state), remedy, cause)
 
     def _require_movable(self, state: Mapping[str, Reading]) -> None:
         self._require_no_alarm(state)

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from drivers.instrument import require_positive, require_range
-from drivers.paths import TurnPath, move_s, require_rate
+from drivers.instrument import require_positive
+from drivers.motor_stage import MotorSettings
 
 __all__ = ["FIELDS", "UNITS_DEG", "Settings"]
 
@@ -36,7 +36,7 @@ UNITS_DEG = {"deg": 1.0, "degree": 1.0, "degrees": 1.0, "°": 1.0, "mdeg": 1e-3,
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(MotorSettings):
     """One stage: limits and speed, how it moves, when it counts as settled, and how far its record is trusted.
 
     `deg_per_unit` converts the engineering units of the record; without it the units must be those of an angle. `home`
@@ -55,25 +55,7 @@ class Settings:
     timeout_s: float = 5.0
 
     def __post_init__(self) -> None:
-        require_positive(self, "speed_deg_s", "speed_limit_deg_s", "acceleration_deg_s2", "settle_deg", "timeout_s")
-        require_range(self, "limits_deg")
+        super().__post_init__()
+        require_positive(self, "timeout_s")
         if self.deg_per_unit == 0:
             raise ValueError("deg_per_unit must not be 0")
-        if self.speed_deg_s > self.speed_limit_deg_s:
-            raise ValueError(f"speed_deg_s must be at most speed_limit_deg_s, {self.speed_limit_deg_s:g}")
-
-    def rate_deg_s(self, asked_deg_s: float) -> float:
-        """The rate as requested: the record takes any number."""
-        return asked_deg_s
-
-    def way_of_turn(self, name: str, rate_deg_s: float, first_deg: float, last_deg: float) -> tuple[float, float]:
-        """Angles where the run-up begins and the braking ends, deg, for a turn at a constant rate between two angles.
-
-        Raises LimitError for a rate or a way that the stage has not.
-        """
-        require_rate(name, rate_deg_s, rate_deg_s, self.speed_limit_deg_s)
-        return TurnPath(rate_deg_s, self.acceleration_deg_s2, first_deg, last_deg).within(name, self.limits_deg)
-
-    def move_s(self, distance_deg: float) -> float:
-        """Duration of a move, s."""
-        return move_s(distance_deg, self.speed_deg_s, self.acceleration_deg_s2)

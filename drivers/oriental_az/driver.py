@@ -8,18 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
 
-from drivers.errors import DriverError, Interlocked, NotSettled, StageAlarm, StageLost
-from drivers.instrument import OUTSIDE_ANGLE, Check, Identity, require_within
+from drivers.errors import Interlocked, NotSettled, StageAlarm, StageLost
+from drivers.instrument import Check, Identity
+from drivers.motor_stage import LEAD_S, MotorStage, Turn, move_s
 from drivers.oriental_az import registers as az
 from drivers.oriental_az.registers import Alarm, Settings
-from drivers.paths import LEAD_S
 from drivers.transport import Address, Links
 from drivers.transport.modbus import Unit
 
-__all__ = ["RotaryStage", "Settings", "Turn", "connect"]
+__all__ = ["RotaryStage", "Settings", "connect"]
 
 POLL_S = 0.02
 PATIENCE_S = 2.0  # beyond the expected end of a move
@@ -32,26 +30,15 @@ UNWATCHED_S = 1.0  # between two looks at a turn of a drive that does not watch 
 WARM_C = 85.0  # the drive's own alarm limit [M]
 
 
-@dataclass(frozen=True)
-class Turn:
-    """A turn that goes on: its rate as the drive makes it, and how often `require` has to be called meanwhile.
+class RotaryStage(MotorStage):
+    """A stage on an AZ drive."""
 
-    `require` raises StageAlarm, StageLost, or NotSettled where the stage does not turn at the rate.
-    """
-
-    rate_deg_s: float
-    beat_s: float
-    require: Callable[[], None]
-
-
-class RotaryStage:
-    """A stage that is moved to angles in deg and holds them."""
+    settings: Settings
 
     def __init__(self, unit: Unit, links: Links, settings: Settings) -> None:
         self.name = unit.name
         self.settings = settings
         self._unit, self._clock = unit, links.clock
-        self._target_deg = math.nan
         self._holds_target = False  # no command since power-on, homing or a stop
         self._expected_end_s = 0.0
         self._limited = not settings.own_limits  # whether the drive has its limits, where it is to have them
@@ -89,9 +76,6 @@ class RotaryStage:
             is_action = action in az.ACTIONS and low <= high
             yield Check("own limits", is_action, f"action {action:g}, {low:g} .. {high:g} steps in {az.OVERTRAVEL}")
 
-    def close(self) -> None:
-        """Does nothing: the bench closes the link."""
-
     def angle_deg(self) -> float:
         """Motor angle measured by the drive, in deg."""
         return self._unit.read(az.FEEDBACK_POSITION) / self.settings.steps_per_turn * 360
@@ -110,23 +94,6 @@ class RotaryStage:
         self._unit.write(az.RESET_ALARM, 1)
         self._require_no_alarm(self.alarm())
 
-    def move_to(self, angle_deg: float) -> None:
-        """Turn to `angle_deg` and return when it is at rest there.
-
-        Raises LimitError before anything is sent, StageAlarm, StageLost, NotSettled, and the errors of the link.
-        """
-        if self.start(angle_deg):
-            self.wait()
-
-    def start(self, angle_deg: float) -> bool:
-        """Start turning to `angle_deg` and return at once; False if it is there already.
-
-        With a communication time-out, `wait` must follow within it. Raises LimitError before anything is sent,
-        StageAlarm, StageLost, Interlocked.
-        """
-        require_within(f"{self.name}: ", angle_deg, self.settings.limits_deg, "deg", OUTSIDE_ANGLE)
-        return self._start(angle_deg, self.settings) is not None
-
     def wait(self) -> None:
         """Return when the move that was started has ended where it should.
 
@@ -138,35 +105,6 @@ class RotaryStage:
         self._require_ready(outputs)
         self._watch(False)
         self._require_at_target("Remove what blocks the stage, check the load's balance, then repeat the move")
-
-    def rate_deg_s(self, asked_deg_s: float) -> float:
-        """The possible rate nearest to the requested one: a whole number of steps a second."""
-        return self.settings.rate_deg_s(asked_deg_s)
-
-    @contextmanager
-    def turning(self, rate_deg_s: float, first_deg: float, last_deg: float) -> Iterator[Turn]:
-        """Turn from `first_deg` to `last_deg` at a constant rate, which it has when the body begins.
-
-        The body has the turn's time, and half a second more; it must call the turn's `require`. A stage with limits
-        is sent to an angle within them at that speed, where it ends by itself, whatever becomes of this program; one
-        without turns on until it is stopped, and watches over its controller. However the body ends, the stage stands
-        afterwards. Raises LimitError before anything is sent, StageAlarm, StageLost, NotSettled.
-        """
-        start_deg, end_deg = self.settings.way_of_turn(self.name, rate_deg_s, first_deg, last_deg)
-        rate = math.copysign(self.settings.rate_deg_s(abs(rate_deg_s)), last_deg - first_deg)
-        self.move_to(start_deg)
-        try:
-            begun_s = self._begin_turn(rate, end_deg)
-            self._wait_until(begun_s + abs(rate) / self.settings.acceleration_deg_s2 + LEAD_S)
-            yield Turn(rate, min(self._beat_s, UNWATCHED_S), lambda: self._require_turning(rate))
-            if self.settings.endless:
-                self.stop()
-            else:
-                self.wait()
-        except BaseException:
-            with suppress(DriverError):  # the first error is reported
-                self.stop()
-            raise
 
     def require_steady(self) -> None:
         """Compare the drive's status and the encoder's angle with the last command; a stage without one passes.
@@ -229,11 +167,7 @@ class RotaryStage:
         """Raises NotSettled if the encoder's angle is not the target of the last move."""
         angle_deg = self.angle_deg()
         if abs(angle_deg - self._target_deg) > self.settings.settle_deg:
-            raise NotSettled(
-                f"{self.name}: is at {angle_deg:.3f} deg instead of {self._target_deg:.3f} deg, "
-                f"more than {self.settings.settle_deg:g} deg away",
-                remedy,
-            )
+            raise self._away_from_target(angle_deg, remedy)
 
     def _require_coordinates(self, outputs: int) -> None:
         if not outputs & az.HOME_END:
@@ -288,26 +222,33 @@ class RotaryStage:
                 alarm.code,
             )
 
-    def _start(self, angle_deg: float, settings: Settings) -> float | None:
-        """Start turning to an angle within the limits, with the speed of `settings`: when it began; see `start`."""
+    def _start(self, angle_deg: float, speed_deg_s: float) -> float | None:
         outputs = self._require_movable()
         distance_deg = abs(angle_deg - self.angle_deg())
         self._target_deg, self._expected_end_s = angle_deg, self._clock.now()
         self._holds_target = True
-        if _is_at_rest(outputs, az.IN_POSITION) and distance_deg < 180 / settings.steps_per_turn:
+        if _is_at_rest(outputs, az.IN_POSITION) and distance_deg < 180 / self.settings.steps_per_turn:
             return None
         self._watch(True)
-        begun_s = self._operate(az.ABSOLUTE, angle_deg, settings.speed_deg_s)
-        self._expected_end_s = begun_s + settings.move_s(distance_deg)
+        begun_s = self._operate(az.ABSOLUTE, angle_deg, speed_deg_s)
+        self._expected_end_s = begun_s + move_s(distance_deg, speed_deg_s, self.settings.acceleration_deg_s2)
         return begun_s
 
-    def _begin_turn(self, rate_deg_s: float, end_deg: float) -> float:
-        """Start turning at a rate, to `end_deg` or on and on; when it began."""
+    def _begin_turn(self, rate_deg_s: float, start_deg: float, end_deg: float) -> Turn:  # noqa: ARG002
         if self.settings.endless:
             self._require_movable()
             self._watch(True)
-            return self._operate(az.CONTINUOUS, 0.0, rate_deg_s)
-        return self._start(end_deg, replace(self.settings, speed_deg_s=abs(rate_deg_s))) or self._clock.now()
+            begun_s = self._operate(az.CONTINUOUS, 0.0, rate_deg_s)
+        else:
+            begun_s = self._start(end_deg, abs(rate_deg_s)) or self._clock.now()
+        self._wait_until(begun_s + abs(rate_deg_s) / self.settings.acceleration_deg_s2 + LEAD_S)
+        return Turn(rate_deg_s, min(self._beat_s, UNWATCHED_S), lambda: self._require_turning(rate_deg_s))
+
+    def _end_turn(self) -> None:
+        if self.settings.endless:
+            self.stop()
+        else:
+            self.wait()
 
     def _operate(self, kind: int, angle_deg: float, speed_deg_s: float) -> float:
         """Write the direct operation, speeds in steps per second, which are its counts; when it began, s."""

@@ -26,8 +26,8 @@ import math
 from dataclasses import dataclass
 
 from drivers.errors import LimitError
-from drivers.instrument import require_positive, require_range
-from drivers.paths import TurnPath, move_s, require_rate
+from drivers.instrument import require_positive
+from drivers.motor_stage import MotorSettings
 from drivers.transport.modbus import Register
 
 # Direct data operation: written in one go; the trigger is last and starts the move.
@@ -138,7 +138,7 @@ def alarm_of(code: int) -> Alarm | None:
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(MotorSettings):
     """One stage: gear and resolution, limits of the motor angle and speed, how it moves, when it counts as settled.
 
     With a `communication_timeout_s`, the drive stops by itself (alarm 85) when its controller falls silent for so long
@@ -164,12 +164,10 @@ class Settings:
     own_limits: bool = False
 
     def __post_init__(self) -> None:
-        require_positive(self, "steps_per_turn", "speed_deg_s", "acceleration_deg_s2", "settle_deg", "current_percent")
-        require_range(self, "limits_deg")
+        super().__post_init__()
+        require_positive(self, "steps_per_turn", "current_percent")
         if self.own_limits and not all(map(math.isfinite, self.limits_deg)):
             raise ValueError("with own_limits, give both numbers of limits_deg")
-        if self.speed_deg_s > self.speed_limit_deg_s:
-            raise ValueError(f"speed_deg_s must be at most speed_limit_deg_s, {self.speed_limit_deg_s:g}")
         if self.communication_timeout_s and not 0.5 <= self.communication_timeout_s <= 10:
             raise ValueError("communication_timeout_s must be 0 for none, or 0.5 to 10")
 
@@ -184,23 +182,15 @@ class Settings:
         return round(asked_deg_s * per_deg) / per_deg
 
     def way_of_turn(self, name: str, rate_deg_s: float, first_deg: float, last_deg: float) -> tuple[float, float]:
-        """Angles where the run-up begins and the braking ends, deg, for a turn at a constant rate between two angles.
-
-        Raises LimitError for a rate or a way that the stage has not.
-        """
-        require_rate(name, rate_deg_s, self.rate_deg_s(rate_deg_s), self.speed_limit_deg_s)
+        """Also raises LimitError for a stage without limits that would not stop if this program crashes."""
         if self.endless and not self.communication_timeout_s:
             raise LimitError(
                 f"{name}: has no limits and would not stop if this program crashes; nothing was sent",
                 "Set communication_timeout_s in the bench file, so that the drive stops by itself, or set limits_deg",
             )
-        return TurnPath(rate_deg_s, self.acceleration_deg_s2, first_deg, last_deg).within(name, self.limits_deg)
+        return super().way_of_turn(name, rate_deg_s, first_deg, last_deg)
 
     @property
     def endless(self) -> bool:
         """Whether the stage can turn on and on: nothing such as a cable limits it."""
         return all(map(math.isinf, self.limits_deg))
-
-    def move_s(self, distance_deg: float) -> float:
-        """Duration of a move, s."""
-        return move_s(distance_deg, self.speed_deg_s, self.acceleration_deg_s2)

@@ -15,6 +15,7 @@ from calibrations.table import Array
 from drivers.errors import LimitError
 from drivers.instrument import OUTSIDE_ANGLE, OUTSIDE_POSITION, OUTSIDE_TEMPERATURE, require_within
 from drivers.labjack_t7.driver import Settings as AdcSettings
+from drivers.motor_stage import Turn
 from drivers.omega_cn7500.driver import Settings as OvenSettings
 from procedures.bounds import MOST_POSES
 from procedures.instruments import Samples
@@ -91,17 +92,6 @@ class StageSettings(Protocol):
     def rate_deg_s(self, asked_deg_s: float) -> float: ...
 
 
-@dataclass(frozen=True)
-class PlannedTurn:
-    """A rotation of any length."""
-
-    rate_deg_s: float
-    beat_s: float = math.inf
-
-    def require(self) -> None:
-        """The rotation never fails."""
-
-
 class PlannedStage:
     """A planned stage: it is at the last target, and refuses the same targets as its driver."""
 
@@ -123,11 +113,11 @@ class PlannedStage:
         return self._settings.rate_deg_s(asked_deg_s)
 
     @contextmanager
-    def turning(self, rate_deg_s: float, first_deg: float, last_deg: float) -> Iterator[PlannedTurn]:
+    def turning(self, rate_deg_s: float, first_deg: float, last_deg: float) -> Iterator[Turn]:
         start_deg, end_deg = self._settings.way_of_turn(self._name, rate_deg_s, first_deg, last_deg)
         self.move_to(start_deg)
         self._ledger.add(f"{self._name} turns to {end_deg:g} deg at {rate_deg_s:g} deg/s", EXCHANGE_S)
-        yield PlannedTurn(math.copysign(rate_deg_s, last_deg - first_deg))
+        yield Turn(math.copysign(rate_deg_s, last_deg - first_deg), math.inf, lambda: None)
         outside_deg = abs(end_deg - start_deg) - abs(last_deg - first_deg)
         self._ledger.add(f"{self._name} brakes", outside_deg / rate_deg_s + EXCHANGE_S)
         self._at_deg = end_deg

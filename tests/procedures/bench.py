@@ -12,12 +12,12 @@ import numpy as np
 
 from calibrations.table import Table
 from drivers.handheld.world import HandheldWorld
+from drivers.motor_stage import Turn
 from drivers.world.stage import Trajectory
 from drivers.world.world import World
 from procedures.instruments import Samples
 from procedures.questions import Mounting, Question
 from procedures.session import Dwell, Guidance, Limits, Pose, Reading, Session
-from rig.planning.planned import PlannedTurn
 from rig.record.values import Block, KeptPose
 
 CHANNELS = ("vx", "vy", "supply")
@@ -44,7 +44,7 @@ class Stage:
         return asked_deg_s
 
     @contextmanager
-    def turning(self, rate_deg_s: float, first_deg: float, last_deg: float) -> Iterator[PlannedTurn]:
+    def turning(self, rate_deg_s: float, first_deg: float, last_deg: float) -> Iterator[Turn]:
         """Two seconds of run-up on either side, at 60 deg/s^2."""
         way = math.copysign(1.0, last_deg - first_deg)
         beyond_deg = rate_deg_s**2 / 120.0 + 2.0 * rate_deg_s
@@ -52,7 +52,7 @@ class Stage:
         turn = Trajectory(self.world.now_s, self.angle_deg(), last_deg + way * beyond_deg, rate_deg_s, 60.0)
         self.world.move_stage(self.axis, turn)
         self.world.advance(self.world.now_s + rate_deg_s / 60.0 + 2.0)
-        yield PlannedTurn(way * rate_deg_s)
+        yield Turn(way * rate_deg_s, math.inf, lambda: None)
         self.world.advance(turn.end_s)
 
     def home(self) -> None: ...
