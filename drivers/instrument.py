@@ -42,8 +42,6 @@ class Instrument(Protocol):
 
     def self_test(self) -> list[Check]: ...
 
-    def close(self) -> None: ...
-
 
 class Alarm(Protocol):
     """An alarm of a drive, its cause in words, and the remedy."""

@@ -112,9 +112,6 @@ class MotorStage:
     settings: MotorSettings
     _target_deg = math.nan  # of the last move; not a number before the first one
 
-    def close(self) -> None:
-        """Does nothing: the bench closes the link."""
-
     def rate_deg_s(self, asked_deg_s: float) -> float:
         """The possible rate that is nearest to the requested one."""
         return self.settings.rate_deg_s(asked_deg_s)

@@ -101,9 +101,6 @@ class Recorder(Generic[Settings]):
     name: str
     settings: Settings
 
-    def close(self) -> None:
-        """Does nothing: the bench closes the link."""
-
     def power(self, on: bool) -> None:  # noqa: ARG002
         """Raises LimitError: no line of it switches the sensor."""
         raise LimitError(

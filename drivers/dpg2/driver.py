@@ -92,9 +92,6 @@ class Level:
         )
         return [Check("reading", True, reading_text)]
 
-    def close(self) -> None:
-        """Does nothing: the bench closes the link."""
-
     def read(self) -> Reading:
         """The mean of `settings.readings` readings, once they agree.
 

@@ -72,9 +72,6 @@ class ManualStage:
         """The resolution of the dial, without a question to the person."""
         return [Check("dial", True, f"read by a person to {60 * self.settings.resolution_deg:g} arcmin")]
 
-    def close(self) -> None:
-        """Do nothing: the stage has no link."""
-
     def angle_deg(self) -> float:
         """The last reading of the dial. Asks the person if there is none yet."""
         if self.read_deg is None:

@@ -73,9 +73,6 @@ class Oven:
             thermometer = Check("thermometer", False, fault.what)
         return [thermometer, Check("control", method == 0, f"{name} control")]
 
-    def close(self) -> None:
-        """Does nothing: the bench closes the link."""
-
     def temperature_c(self) -> float:
         """The temperature of the thermocouple, C.
 

@@ -122,9 +122,6 @@ class Positioner:
             Check("servo", True, f"off: {', '.join(off)}" if off else "on"),
         ]
 
-    def close(self) -> None:
-        """Does nothing: the bench closes the link."""
-
     def servo(self, on: bool) -> None:
         """Close or open the loop of every axis; moves and oscillations need it closed."""
         states = " ".join(f"{axis} {int(on)}" for axis in self.settings.axes.values())

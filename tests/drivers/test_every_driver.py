@@ -76,4 +76,3 @@ def test_it_says_who_it_is_and_how_it_is(instrument: Any) -> None:
     assert instrument.identify().model
     checks = instrument.self_test()
     assert all(isinstance(check, Check) and check.detail for check in checks)
-    instrument.close()
