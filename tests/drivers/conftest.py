@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -18,6 +19,7 @@ from drivers.omega_cn7500 import twin as omega_cn7500_twin
 from drivers.oriental_az import driver as oriental_az
 from drivers.oriental_az import twin as oriental_az_twin
 from drivers.transport import Links
+from drivers.transport.link import open_link
 from drivers.transport.server import Server
 from drivers.world import positioner
 from drivers.world.kernel import record
@@ -94,6 +96,21 @@ class SmallWorld:
         self.carriages = {axis: np.array(pieces) for axis, pieces in state["carriages"].items()}
         self.oven = (state["oven"][0], state["oven"][1])
         self._random.bit_generator.state = state["random"]
+
+
+@contextmanager
+def bytes_exchanged(server: Server, clock: SimulatedClock) -> Iterator[Callable[[str], str]]:
+    """A function that sends hexadecimal bytes to a simulated instrument, and returns those of the answer."""
+    clock.attach(server)
+    link = open_link(server.url, clock)
+
+    def exchange(request: str) -> str:
+        link.write(bytes.fromhex(request))
+        return link.read(0.2).hex(" ").upper()
+
+    yield exchange
+    link.close()
+    server.close()
 
 
 @dataclass

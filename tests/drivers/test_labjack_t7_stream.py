@@ -23,7 +23,7 @@ from drivers.labjack_t7 import twin as labjack_t7_twin
 from drivers.labjack_t7.stream import Packets, Reception
 from drivers.transport import Links
 from drivers.transport.link import Link, open_link
-from drivers.transport.server import Port, Server
+from drivers.transport.server import Port, Server, Twin
 from drivers.world.config import WorldConfig
 from drivers.world.world import World
 
@@ -99,7 +99,7 @@ def test_transaction_numbers_turn_over_within_a_long_stream(bench: Any, monkeypa
     assert scans == [30_000, 30_000, 10_000]
 
 
-class Device:
+class Device(Twin):
     """Sends `data`, once, a second from now on."""
 
     def __init__(self, data: bytes) -> None:
@@ -112,11 +112,6 @@ class Device:
 
     def due_s(self) -> float:
         return 1.0 if self._data else float("inf")
-
-    def state(self) -> dict[str, Any]:
-        return {}
-
-    def restore(self, state: Any) -> None: ...
 
 
 @pytest.fixture

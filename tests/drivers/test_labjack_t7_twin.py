@@ -18,7 +18,7 @@ from drivers.labjack_t7 import twin as labjack_t7_twin
 from drivers.labjack_t7.driver import Settings
 from drivers.transport import Links
 from drivers.transport.faults import Fault, faults_of
-from drivers.transport.link import open_link
+from tests.drivers.conftest import bytes_exchanged
 
 STEP_V = 3.2e-4  # one code in the range of 10 V
 
@@ -27,16 +27,8 @@ STEP_V = 3.2e-4  # one code in the range of 10 V
 def ask(small_world: Any) -> Iterator[Callable[[str], str]]:
     clock = SimulatedClock()
     server = labjack_t7_twin.serve(small_world, {"adc": (1, Settings(channels={"supply": 5}))})
-    clock.attach(server)
-    link = open_link(server.url, clock)
-
-    def exchange(request: str) -> str:
-        link.write(bytes.fromhex(request))
-        return link.read(0.2).hex(" ").upper()
-
-    yield exchange
-    link.close()
-    server.close()
+    with bytes_exchanged(server, clock) as exchange:
+        yield exchange
 
 
 @pytest.mark.parametrize(

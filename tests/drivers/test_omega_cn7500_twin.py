@@ -10,23 +10,15 @@ import pytest
 from drivers.clock import SimulatedClock
 from drivers.omega_cn7500 import twin as omega_cn7500_twin
 from drivers.omega_cn7500.driver import Settings
-from drivers.transport.link import open_link
+from tests.drivers.conftest import bytes_exchanged
 
 
 @pytest.fixture
 def ask(small_world: Any) -> Iterator[Callable[[str], str]]:
     clock = SimulatedClock()
     server = omega_cn7500_twin.serve(small_world, {"oven": (1, Settings())})
-    clock.attach(server)
-    link = open_link(server.url, clock)
-
-    def exchange(request: str) -> str:
-        link.write(bytes.fromhex(request))
-        return link.read(0.2).hex(" ").upper()
-
-    yield exchange
-    link.close()
-    server.close()
+    with bytes_exchanged(server, clock) as exchange:
+        yield exchange
 
 
 def test_the_thermometer_counts_tenths(ask: Callable[[str], str]) -> None:

@@ -14,6 +14,7 @@ from drivers.oriental_az import twin as oriental_az_twin
 from drivers.oriental_az.driver import Settings, connect
 from drivers.transport import Address
 from drivers.transport.link import open_link
+from tests.drivers.conftest import bytes_exchanged
 
 MOVE = (
     "01 10 00 58 00 10 20 00 00 00 00 00 00 00 01 00 00 21 34 00 00 07 D0 00 00 05 DC 00 00 05 DC "
@@ -38,16 +39,8 @@ def clock() -> SimulatedClock:
 def ask(small_world: Any, clock: SimulatedClock) -> Iterator[Ask]:
     """Send hexadecimal bytes to a bus with unit 1 (100 steps/deg, standing at 7 deg) and give the answer's."""
     server = oriental_az_twin.serve(small_world, {"alpha": (1, Settings(steps_per_turn=36000))})
-    clock.attach(server)
-    link = open_link(server.url, clock)
-
-    def exchange(request: str) -> str:
-        link.write(bytes.fromhex(request))
-        return link.read(0.2).hex(" ").upper()
-
-    yield exchange
-    link.close()
-    server.close()
+    with bytes_exchanged(server, clock) as exchange:
+        yield exchange
 
 
 def test_the_position_register_counts_steps(ask: Ask) -> None:

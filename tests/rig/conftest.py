@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 import yaml
@@ -17,6 +18,9 @@ from rig.record import Record
 from rig.record.lab import prepare
 from tests.calibrations.synthetic import components, poses, turns
 from tests.rig.postgres import Server, serving
+
+if TYPE_CHECKING:
+    from distributed import LocalCluster
 
 WORD = "g3heim"  # the password of people who read and write a lab's record
 MODEL = """schema: rig.model/1
@@ -137,3 +141,19 @@ def people(server: Server) -> Server:
 def database(server: Server) -> str:
     """An empty lab's record on the server, by its name."""
     return server.new_database(like="prepared")
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[LocalCluster]:
+    """A scheduler that listens, with one worker in this process."""
+    from distributed import LocalCluster  # slow to import; few tests need it
+
+    with LocalCluster(
+        n_workers=1,
+        threads_per_worker=1,
+        processes=False,
+        protocol="tcp://",
+        host="127.0.0.1",
+        dashboard_address="127.0.0.1:0",
+    ) as made:
+        yield made

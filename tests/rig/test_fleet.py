@@ -7,7 +7,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -34,20 +34,6 @@ LINEAR = dump_model(read_model("linear"))
 START = Question("look", LINEAR)
 STEP = "a step"
 RIGS = {"a": Rig(), "b": Rig(wave=0.06), "c": Rig()}
-
-
-@pytest.fixture(scope="module")
-def cluster() -> Iterator[LocalCluster]:
-    """A scheduler that listens, with one worker in this process."""
-    with LocalCluster(
-        n_workers=1,
-        threads_per_worker=1,
-        processes=False,
-        protocol="tcp://",
-        host="127.0.0.1",
-        dashboard_address="127.0.0.1:0",
-    ) as made:
-        yield made
 
 
 @pytest.fixture(scope="module")

@@ -54,20 +54,6 @@ class Ripple(Effect):
 '''
 
 
-@pytest.fixture(scope="module")
-def cluster() -> Iterator[LocalCluster]:
-    """A scheduler that listens, with one worker in this process."""
-    with LocalCluster(
-        n_workers=1,
-        threads_per_worker=1,
-        processes=False,
-        protocol="tcp://",
-        host="127.0.0.1",
-        dashboard_address="127.0.0.1:0",
-    ) as made:
-        yield made
-
-
 def rippled(seed: int) -> Table:
     table = sensor(seed)
     wave = 5e-5 * np.cos(3 * np.radians(BETA))

@@ -11,14 +11,14 @@ from drivers.dpg2 import driver as dpg2
 from drivers.dpg2.driver import Level, Settings
 from drivers.errors import BadFrame, InstrumentError, LinkTimeout, NotSettled
 from drivers.transport import Address, Links
-from drivers.transport.server import Connection, Port, Server
+from drivers.transport.server import Connection, Port, Server, Twin
 
 Answers = dict[bytes, list[bytes]]
 Levels = Callable[..., Level]
 SINGLE = Settings(readings=1)
 
 
-class Talker:
+class Talker(Twin):
     """Answers each letter with the next of its answers, the last one for ever; says `babble` every 0.1 s."""
 
     def __init__(self, answers: Answers, babble: bytes) -> None:
@@ -35,11 +35,6 @@ class Talker:
 
     def due_s(self) -> float:
         return 0.1 * (self._said + 1) if self._babble else float("inf")
-
-    def state(self) -> dict[str, int]:
-        return {}
-
-    def restore(self, state: object) -> None: ...
 
     def _answer(self, connection: Connection, now_s: float) -> None:
         letter, connection.inbox[:] = bytes(connection.inbox), b""

@@ -12,7 +12,7 @@ from drivers.errors import LimitError, LinkTimeout, OverRange, Refused, StreamEr
 from drivers.labjack_t7 import driver as labjack_t7
 from drivers.labjack_t7.driver import T7, Settings
 from drivers.transport import Address, Links
-from drivers.transport.server import Port, Server
+from drivers.transport.server import Port, Server, Twin
 
 TCP = "tcp://127.0.0.1:0"
 SLOPE = 0.00031580578  # nominal, as FLOAT32 39 A5 92 BC
@@ -42,7 +42,7 @@ PACKET = HEADER + "82 F3 FF FE 00 01 92 93"
 Converters = Callable[..., T7]
 
 
-class Burst:
+class Burst(Twin):
     """Sends `data` on its port at `at_s`."""
 
     def __init__(self, port: Port, data: bytes, at_s: float) -> None:
@@ -56,11 +56,6 @@ class Burst:
 
     def due_s(self) -> float:
         return self._at_s
-
-    def state(self) -> dict[str, int]:
-        return {}
-
-    def restore(self, state: object) -> None: ...
 
 
 @pytest.fixture

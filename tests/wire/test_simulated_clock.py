@@ -12,12 +12,12 @@ from drivers import clock as clock_module
 from drivers.clock import SimulatedClock, WallClock, serve_forever
 from drivers.errors import ClockStuck
 from drivers.transport.link import Link, open_link
-from drivers.transport.server import Connection, Port, Server
+from drivers.transport.server import Connection, Port, Server, Twin
 
 LISTEN = "tcp://127.0.0.1:0"
 
 
-class Ticker:
+class Ticker(Twin):
     """A twin that says the time every second until it has done so `count` times."""
 
     def __init__(self, port: Port, count: int) -> None:
@@ -31,11 +31,6 @@ class Ticker:
 
     def due_s(self) -> float:
         return self._said + 1.0 if self._left else float("inf")
-
-    def state(self) -> dict[str, int]:
-        return {}
-
-    def restore(self, state: object) -> None: ...
 
 
 def ticking(clock: SimulatedClock, count: int = 5) -> Link:
