@@ -218,6 +218,11 @@ class Picture:
     caption: str
     chart: Chart = field(repr=False)
 
+    @property
+    def words(self) -> str:
+        """The picture for screen readers."""
+        return f"{self.title}. {self.caption}"
+
 
 def single_chart(panel: Panel, height: float = 3.8) -> Chart:
     """A chart of one panel."""

@@ -60,4 +60,4 @@ def _kind(block: Block) -> str:
 
 def _markup(picture: Picture) -> Markup:
     """The picture as SVG, with words for screen readers."""
-    return Markup(inline(picture.chart, picture.name, f"{picture.title}. {picture.caption}"))  # noqa: S704 made here
+    return Markup(inline(picture.chart, picture.name, picture.words))  # noqa: S704 made here

@@ -6,9 +6,9 @@ import hashlib
 import io
 import pickle
 import re
+from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from functools import lru_cache, singledispatch
+from functools import singledispatch
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -67,7 +67,7 @@ LINE = 0.8
 DASHES = {"solid": "-", "dash": "--", "dot": ":"}
 SYMBOLS = {"circle": "o", "diamond": "D", "triangle-up": "^", "triangle-down": "v", "cross": "+"}
 FEW_MARKS, LONG_MARK = 4, 200.0  # marks of an axis with values larger than this multiple of its range
-MOST_DRAWN = 64  # charts in memory: those of some reports
+MOST_DRAWN = 64  # elements in memory: those of some reports
 MOST_LEVEL = 8  # names on a horizontal axis; more are written aslant
 DROPPED_MARKUP = (
     r"<metadata>.*?</metadata>",
@@ -130,20 +130,30 @@ def inline(chart: c.Chart, name: str, words: str) -> str:
 
     `words` describe it for screen readers. A chart of the same content is drawn once.
     """
-    return _inline(_Content(hashlib.sha256(pickle.dumps(chart)).digest(), chart), name, words)
+    content = pickle.dumps((chart, name, words))
+    if (text := drawn(content)) is None:
+        remember(content, text := _draw_inline(chart, name, words))
+    return text
 
 
-@dataclass(frozen=True)
-class _Content:
-    """A chart that equals another one of the same content."""
-
-    digest: bytes
-    chart: c.Chart = field(compare=False)
+# Elements in memory, by the pickled arguments of `inline`: the digest of these, and the element.
+_DRAWN: OrderedDict[bytes, str] = OrderedDict()
 
 
-@lru_cache(maxsize=MOST_DRAWN)
-def _inline(content: _Content, name: str, words: str) -> str:
-    text = svg(content.chart).decode()
+def drawn(content: bytes) -> str | None:
+    """The element of these pickled arguments of `inline`, if it is in memory."""
+    return _DRAWN.get(hashlib.sha256(content).digest())
+
+
+def remember(content: bytes, text: str) -> None:
+    """Keep an element in memory, in place of the oldest one if there are many."""
+    _DRAWN[hashlib.sha256(content).digest()] = text
+    while len(_DRAWN) > MOST_DRAWN:
+        _DRAWN.popitem(last=False)
+
+
+def _draw_inline(chart: c.Chart, name: str, words: str) -> str:
+    text = svg(chart).decode()
     text = text[text.index("<svg") :].strip()
     for pattern in DROPPED_MARKUP:
         text = re.sub(pattern, "", text, flags=re.DOTALL)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from calibrations.errors import CalibrationError
 from calibrations.model.file import read_model, shipped_names
+from calibrations.presentation.second_core import SecondCore
 from rig.errors import RigError
 from rig.files import RECORD, home, write_whole
 from rig.lab_url import lab_url, mask_url
@@ -35,7 +36,7 @@ class Desk:
 
     `dark`: None follows the browser. `sessions`: the open model sessions by data, model and noise model, in order of
     use. `beginnings`: the same without added effects, with the searches that pages and reports share. `reports`: HTML
-    by the content of the data.
+    by the content of the data. `second_core` draws pictures of reports.
     """
 
     bench_file: Path | None
@@ -44,6 +45,7 @@ class Desk:
     sessions: OrderedDict[tuple[str, str, str], ModelSession[Any]] = field(default_factory=OrderedDict)
     beginnings: OrderedDict[tuple[str, str, str], ModelSession[Any]] = field(default_factory=OrderedDict)
     reports: OrderedDict[str, str] = field(default_factory=OrderedDict)
+    second_core: SecondCore = field(default_factory=SecondCore)
 
     def open(
         self, data: str, model: str, added_effects: Sequence[str] | None = None, noise: str = ""
@@ -108,6 +110,10 @@ class Desk:
         self.reports[key] = text
         while len(self.reports) > MOST_OPEN:
             self.reports.popitem(last=False)
+
+    def close(self) -> None:
+        """End what only this desk needs."""
+        self.second_core.stop()
 
     def choose_bench(self, bench_file: Path | None) -> None:
         """Make another bench that of all pages. Raises RigError during a run: its bench stays until it ends."""

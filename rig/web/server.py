@@ -7,6 +7,7 @@ import logging
 import signal
 import socket
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from urllib.parse import parse_qs
 
@@ -76,7 +77,7 @@ def serve(desk: Desk, host: str, port: int | None, token: str, ready: Callable[[
     )  # open pages keep their connections, so there is nothing to wait for
     logging.getLogger("uvicorn.error").addFilter(lambda entry: "graceful shutdown" not in entry.getMessage())
     ignored = signal_handlers(lambda *_: None, signal.SIGINT, signal.SIGTERM)  # uvicorn raises them again after its end
-    with ignored, listener:
+    with ignored, listener, closing(desk):
         _Server(config, lambda: ready(place)).run(sockets=[listener])
     atexit.register(leave_calculations)
 

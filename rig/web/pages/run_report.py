@@ -99,7 +99,9 @@ def report_html(
     form = "with the next experiment" if plans_next else "without it"
     key = " ".join([content_of(request.data, request.model).key, request.noise or "", form, *own_effects])
     if key not in desk.reports:
-        _, make = make_report(request, lambda _: None, visit.searched, session, plans_next)
+        desk.second_core.start()
+        pictures, make = make_report(request, lambda _: None, visit.searched, session, plans_next)
+        desk.second_core.draw(pictures)
         desk.keep_report(key, make())
     return desk.reports[key]
 
