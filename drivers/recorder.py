@@ -37,8 +37,8 @@ class Samples:
 class Inputs(Generic[Input]):
     """The inputs of a converter, as in its settings: {name: input}.
 
-    Those `on_request` are wired too, and are measured only for who asks for them. Both are fields of the settings of
-    each converter, with its own defaults.
+    Inputs `on_request` are wired too, but are measured only if a procedure asks for them. Both are fields of the
+    settings of each converter, with its own defaults.
     """
 
     channels: Mapping[str, Input]

@@ -109,7 +109,7 @@ def _window_ratio(window: Array, noise: NoiseAtRest, alarm: float) -> tuple[floa
 
 
 def _creep_ratio(means: Array, noise: NoiseAtRest, alarm: float) -> float:
-    """The quotient of creep over its limit, from window means (k, 3)."""
+    """Creep divided by its limit, from window means (k, 3)."""
     quotient = float(np.mean(means.var(axis=0, ddof=1) / noise.creep))
     freedom = 3 * EACH_AXIS * SUCCESSIVE * (noise.windows - 1)
     return quotient / float(fdtri(3.0 * (len(means) - 1), freedom, 1 - alarm))

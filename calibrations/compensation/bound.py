@@ -199,7 +199,7 @@ def _extreme(name: str, first: Pair, second: Pair) -> Pair:
 
 
 def _choose(condition: Pair, yes: Pair, no: Pair) -> Pair:
-    """A choice: slope of either branch; a jump where the condition follows the variables."""
+    """A choice between two values: the slopes of both; unbounded where the condition depends on the variables."""
     c, dc = condition
     surely, surely_not = (c.low > 0) | (c.high < 0), c.zero
     value = _pick(surely, surely_not, yes[0], no[0])
@@ -209,7 +209,7 @@ def _choose(condition: Pair, yes: Pair, no: Pair) -> Pair:
 
 
 def _bound_step(name: str, inner: tuple[Pair, ...]) -> Pair:
-    """Comparisons and signs: flat, with a jump where the variables decide."""
+    """Comparisons and signs: slope 0, but unbounded where the result depends on the variables."""
     (x, dx), (y, dy) = (
         inner
         if len(inner) == 2

@@ -47,7 +47,7 @@ AXIS_NAMES = "XYZ"
 
 @dataclass(frozen=True)
 class Slot:
-    """Which sensor of the autopilot: `number` 0 is the first. `device_id`: as the autopilot reports it."""
+    """The place of a sensor in the autopilot: `number` 0 is the first. `device_id`: as the autopilot reports it."""
 
     number: int = 0
     device_id: int | None = None
@@ -98,7 +98,7 @@ def _px4_sensor(fitted: tuple[Outputs, LinearForm], slot: Slot) -> tuple[Mapping
 
 
 def _px4_thermal(form: LinearForm, simulated: SimulatedSensor, letter: str, slot: Slot) -> Iterator[tuple[str, Value]]:
-    """T without its constant, which the offset holds."""
+    """The coefficients of T without the constant, which is part of the offset."""
     n = slot.number
     low, high = simulated.spans["temperature_c"]
     yield f"TC_{letter}_ENABLE", 1

@@ -78,7 +78,7 @@ def _warn_of_unchecked_rows(fit: Fit, lone: NDArray[np.bool_]) -> str:
 def lets_go(smaller: Fit, larger: Fit) -> bool:
     """Whether a parameter that `smaller` determines is undetermined in `larger`: for positions of unknown orientation.
 
-    Effects that bend the output enough make one magnitude of anything: of a sphere without end, and of no other sense.
+    With enough nonlinearity, a model can give every output the same magnitude; the parameters then mean nothing.
     """
     if not larger.table.type.magnitude:
         return False

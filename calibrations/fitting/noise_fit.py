@@ -229,9 +229,10 @@ class NoiseSearch:
 
 
 def _orthonormalise(columns: Array, order: Sequence[int], basis: Array, least: Array) -> tuple[list[int], Array]:
-    """The columns (n, k) that are longer than `least` (k,) beside the basis and those before, and the basis with them.
+    """Extend an orthonormal basis by columns (n, k): (the numbers of the added columns, the basis with them).
 
-    Gram and Schmidt's way, twice for each column: where columns are zero, their part of the basis is zero.
+    A column is added if its part orthogonal to the basis is longer than `least` (k,). Gram-Schmidt, twice for each
+    column; where columns are zero, their part of the basis is zero.
     """
     taken = []
     for k in order:

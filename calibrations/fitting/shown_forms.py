@@ -63,7 +63,7 @@ class Shown:
 
     @staticmethod
     def of(fit: Solution, forms: Mapping[str, Form], apart: str = "") -> Shown:
-        """The forms by name, and an effect of the model, beside the other parameters of a fit."""
+        """The forms by name and one effect (`apart`), tested together with the other parameters of a fit."""
         J, own = fit.whitened[:, 1:], fit.problem.layout.of_effect(apart)
         parts = {name: fit.noise.whiten(form_columns(fit, form)) for name, form in forms.items()}
         parts |= {apart: J[:, own]} if apart else {}
@@ -91,7 +91,7 @@ class Shown:
         return gains(self.gram, sizes, [self.apart])[self.apart][0]
 
     def sized(self, name: str, sizes: Sizes) -> Form:
-        """A form with the size that was found, and the columns that add something."""
+        """A form with its fitted size, and without the columns that contribute nothing."""
         form, g = self.forms[name], self.gram
         block, base = g.blocks[name], len(g.base_with_data)
         columns = self.columns[:, base + block.start : base + block.stop]

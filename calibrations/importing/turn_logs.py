@@ -57,7 +57,7 @@ def cut_turns(columns: Mapping[str, Array], constants: Mapping[str, Constant], s
 
 
 def _noise_multiples(values: Array) -> Array:
-    """Samples over their noise, so that sensors of different units count alike."""
+    """Samples divided by their noise, so that sensors with different units can be compared."""
     noise = float(robust_std(np.diff(values)))
     return values / noise if noise > 0 else np.zeros_like(values)
 
@@ -81,7 +81,7 @@ class Movement:
 
     @property
     def axis(self) -> int:
-        """The axis whose output shows most of it."""
+        """The axis whose output shows most of the turn."""
         return int(np.argmax(np.abs(self.integral)))
 
     @property

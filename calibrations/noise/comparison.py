@@ -168,7 +168,7 @@ class Stretch:
 
     @property
     def tau_s(self) -> tuple[float, float]:
-        """The averaging times that it shows at."""
+        """The averaging times at which the difference shows."""
         return PEAK / self.high_hz, PEAK / self.low_hz
 
     @property
@@ -186,7 +186,7 @@ class Stretch:
 
 
 def stretches(fit: ChannelFit, most: int = 3) -> list[Stretch]:
-    """The differences of the smallest p-value, without overlaps, smallest first; p-values of 1 if there is none."""
+    """The bands that differ most from the model, by p-value, without overlaps; p-values of 1 if none differs."""
     order = np.argsort(fit.frequency_hz)
     f, nu = fit.frequency_hz[order], fit.freedom[order]
     power = nu * (fit.density / fit.expected)[order]
@@ -228,7 +228,7 @@ def places(fit: NoiseFit) -> tuple[Place, ...]:
 
 
 def evaluate(model: Model, still: Still) -> NoiseFit | None:
-    """The model with the values that it has; None where it has none. Raises DataError for a channel that it has not."""
+    """The model with its own values; None if it has none. Raises DataError for a channel without values."""
     terms = noise_terms(model)
     signal = signal_terms(model)
     if not model.params or not all(term.estimates for term in signal):
@@ -276,7 +276,7 @@ def _failures(fit: NoiseFit, curves: tuple[DeviationComparison, ...]) -> list[Pl
 
 
 def _times(fit: ChannelFit, curve: DeviationComparison, limit: float) -> list[Place]:
-    """Stretches of neighbouring averaging times that fail on the same side."""
+    """Groups of neighbouring averaging times at which the model fails in the same direction."""
     off = (curve.chance < limit / len(curve.tau_s)) & (np.abs(curve.ratio - 1) > NEGLIGIBLE)
     side = np.where(off, np.sign(curve.ratio - 1), 0).astype(int)
     places = []
@@ -306,8 +306,8 @@ TREND_SHARE = 0.25  # of a part's ordinates, that tell of its trend
 
 @dataclass(frozen=True)
 class Levels:
-    """The level of one channel's noise in equal parts of its record, as multiples of their mean, and the chance that
-    they differ so."""
+    """The level of one channel's noise in equal parts of its record, as multiples of their mean, and the p-value of
+    their differences."""
 
     axis: str
     levels: Array

@@ -240,7 +240,7 @@ REDDEST, BLUEST = -3, 2
 
 
 def noise_type(n: int, moments: Sequence[float] | Array) -> int | None:
-    """alpha, from 2 (quantisation) to -3; None where means are too few or all the same.
+    """The noise type alpha, from 2 (quantisation) to -3; None if the means are too few or all equal.
 
     n means z with the differences w: moments are the sums of z, z^2, z z', w^2 and w w' (' is the one before).
     """

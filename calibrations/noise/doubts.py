@@ -185,9 +185,9 @@ def _round_up_to_tens(seconds: float) -> float:
 
 
 def design_separating_record(search: Search, names: tuple[str, ...]) -> Experiment | None:
-    """The shortest record that separates the first effect in doubt from its rivals with certainty.
+    """The shortest record that separates the first uncertain effect from its rivals with certainty.
 
-    None of them certain, the longest that is proposed.
+    If no length is certain, the longest one.
     """
     name, rivals = next(((name, search.rivals[name]) for name in names if search.rivals.get(name)), ("", ()))
     if not rivals:

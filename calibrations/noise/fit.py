@@ -246,7 +246,7 @@ def noise_terms(model: Model) -> tuple[Term, ...]:
 
 
 def fit(model: Model, still: Still) -> NoiseFit:
-    """The model with its coefficients estimated from the record, less its signal terms as they are.
+    """The model with its coefficients estimated from the record, after its signal terms are removed with their values.
 
     Raises ModelError for one without noise.
     """

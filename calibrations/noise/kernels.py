@@ -42,7 +42,7 @@ class Tree(NamedTuple):
 
 
 def empty_tree() -> Tree:
-    """A tree that has seen nothing."""
+    """A tree without samples."""
 
     def floats(*shape: int) -> Array:
         return np.zeros((LEVELS, *shape))
@@ -58,7 +58,7 @@ def empty_tree() -> Tree:
 
 @njit(cache=True, nogil=True)
 def absorb(tree: Tree, samples: Array, offset: float, third: bool) -> None:
-    """Take in more samples, less `offset`, the same each time; `third`: with differences of the third order."""
+    """Add samples, less `offset`, which is the same in each call; `third`: with differences of the third order."""
     place = 0
     while place < len(samples):
         filled = tree.filled[0]
@@ -116,7 +116,7 @@ def _hand_up(tree: Tree, level: int, third: bool) -> None:
 
 @njit(cache=True, nogil=True)
 def _measure_second(tree: Tree, level: int) -> None:
-    """Add up the squares over all windows of two that end in a bin that is new, and the moments of new bins."""
+    """Add up the squares over all windows of two that end in a new bin, and the moments of new bins."""
     n, old = tree.filled[level], tree.measured[level]
     b = tree.sums[level][:n]
     phase = running_sum(b, b.mean())
@@ -216,7 +216,7 @@ def _add_moments(z: Array, old: int, moments: Array) -> None:
 def reflected_squares(b: Array, k: int) -> float:
     """Sum of squared differences of sums over `k` bins around each of the first k - 1 inner points.
 
-    Before the first bin the record goes on as its own mirror image: the total deviation's extension. b (2k,) or more.
+    Before the first bin the record is extended by its mirror image, as for the total deviation. b (2k,) or more.
     """
     total = 0.0
     right, sum_left = np.sum(b[1 : k + 1]), b[0] + np.sum(b[: k - 1])

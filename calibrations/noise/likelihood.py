@@ -174,7 +174,7 @@ class ChannelFit:
 
     @cached_property
     def deviance(self) -> float:
-        """Twice the log-likelihood that a spectrum of its own in each band would gain."""
+        """Twice the gain in log-likelihood if each band had a free level."""
         ratio = self.density / self.expected
         return float(np.sum(self.freedom * (ratio - 1 - np.log(ratio))))
 

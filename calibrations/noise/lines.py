@@ -57,9 +57,9 @@ def windowed_density(means: Array, sampling: Sampling) -> Array:
 def without_line(
     means: Array, power: Array, sampling: Sampling, expected: Callable[[Array], Array], highest_hz: float
 ) -> tuple[Array, Line] | float:
-    """(means (n,) less their strongest sinusoid, the sinusoid); where none stands out, the amplitude it might have.
+    """Remove the strongest sinusoid from means (n,): (the rest, the sinusoid). `power`: their windowed density.
 
-    `power` is their windowed density.
+    If no sinusoid exceeds the noise, returns only the amplitude that one might have.
     """
     n, dt, window = len(means), sampling.interval_s, _window(len(means))
     last = min(len(power) - 1, int(min(highest_hz, 1 / dt) * n * dt))

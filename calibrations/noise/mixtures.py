@@ -34,7 +34,7 @@ MOST_GAIN = 1e3
 
 
 def chance(gain: float, tubes: Sequence[float]) -> float:
-    """Chance of such a gain, summed over channels, without an effect; `tubes` has L / (2 pi) of each channel."""
+    """P-value of a gain that is summed over channels; `tubes` has L / (2 pi) of each channel."""
     weights = np.ones(1)  # of chi-square with 0, 1, 2 ... degrees of freedom
     for tube in tubes:
         weights = np.convolve(weights, [0.5, 0.5, tube])
@@ -45,7 +45,7 @@ def chance(gain: float, tubes: Sequence[float]) -> float:
 
 @lru_cache(maxsize=256)  # that of processes without a shape is the same for all records
 def least_gain(of_chance: float, tubes: tuple[float, ...]) -> float:
-    """The gain that noise alone makes with this chance."""
+    """The gain that noise alone exceeds with this probability."""
     return float(brentq(lambda gain: chance(gain, tubes) - of_chance, 1e-3, MOST_GAIN))
 
 
@@ -63,7 +63,7 @@ def tube(fit: ChannelFit, effect: Effect) -> float:
 
 
 def _orthogonal_units(columns: Array, fit: ChannelFit) -> Array:
-    """Columns (b, k) of spectra as unit vectors off the effects of the fit."""
+    """Columns (b, k) of spectra as unit vectors that are orthogonal to the effects of the fit."""
     weight = (np.sqrt(fit.freedom / 2) / fit.expected)[:, None]
     effect_columns = np.column_stack(
         [effect_spectrum(e, fit.parts, {**fit.values[e.name], e.parameters[0].name: 1.0}) for e in fit.effects]

@@ -85,7 +85,7 @@ class Steps:
         self._low, self._high = np.inf, -np.inf
 
     def add(self, samples: Array) -> None:
-        """The next samples, shape (n,)."""
+        """Add the next samples, shape (n,)."""
         if not len(samples):
             return
         differences = np.abs(np.diff(samples, prepend=self._last))
@@ -149,7 +149,7 @@ class Outliers:
         self._values = (np.inf, -np.inf)  # lowest and highest wild sample
 
     def add(self, samples: Array) -> None:
-        """The next samples, shape (n,)."""
+        """Add the next samples, shape (n,)."""
         waiting = np.concatenate([self._waiting, samples])
         while len(waiting) >= PART + 2 * SIDE:
             if not self._judged:  # the record goes on as its mirror image, at both ends
@@ -221,7 +221,7 @@ class Stuck:
         self._last = np.nan
 
     def add(self, samples: Array) -> None:
-        """The next samples, shape (n,)."""
+        """Add the next samples, shape (n,)."""
         if not len(samples):
             return
         begins = np.flatnonzero(np.diff(samples, prepend=self._last) != 0)
@@ -261,7 +261,7 @@ class Ends:
         self._ends: dict[str, tuple[float, int]] = {}
 
     def add(self, samples: Array) -> None:
-        """The next samples, shape (n,)."""
+        """Add the next samples, shape (n,)."""
         if not len(samples):
             return
         if not self._n:
@@ -293,8 +293,10 @@ WILD, CONSTANT, COARSE = "wild-samples", "constant-stretch", "coarse-steps"
 
 @dataclass(frozen=True)
 class Oddity:
-    """`kind`, a text, and whether it moves the level of white noise by more than that is uncertain; `hidden`: the noise
-    below a converter's steps, where that is what is odd."""
+    """A fault in the samples, with a text. `matters`: it changes the level of white noise by more than its uncertainty.
+
+    `hidden`: the noise, if the fault is that the noise is below the converter's step.
+    """
 
     kind: str
     text: str

@@ -132,7 +132,7 @@ def _is_identified(mixture: Mixture, effect: Effect) -> bool:
 
 
 def _at_longest_shape(mixture: Mixture, effect: Effect) -> bool:
-    """Whether an effect's shape is the longest that a record shows: it then is the process that it contains."""
+    """Whether an effect has the longest time constant that the record can show, so that a simpler process equals it."""
     shape = effect.parameters[1].name
     return all(
         channel.values[effect.name][shape] > AT_LONGEST_TIME * shape_grid(effect, shape, channel.channel)[-1]

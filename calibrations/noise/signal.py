@@ -40,7 +40,7 @@ def signal_terms(model: Model) -> tuple[Term, ...]:
 
 
 def without_signal(still: Still, terms: tuple[Term, ...]) -> Still:
-    """The record less what these terms add, in place of those that were taken off before. Raises DataError."""
+    """The record without the contributions of these terms; terms removed earlier are restored. Raises DataError."""
     if terms == still.signal:
         return still
     channels = tuple(

@@ -135,9 +135,10 @@ def _of_means(channel: Channel, fit: ChannelFit) -> ChannelFit:
 
 
 def _explains(values: Array, path: Path, rest: ChannelFit) -> bool:
-    """Whether the slow noise of values (n,) is nearly gone, or a slow process needless, in the rest beside a path.
+    """Whether a path of levels explains the slow noise of values (n,); `rest` is the fit after the path is removed.
 
-    That it is nearly gone counts only with many jumps: a few steps have levels near each other by chance.
+    It does if the correlation of neighbours nearly disappears, or if `rest` needs one slow process less. The first
+    counts only with many jumps: the levels of a few jumps can be similar by chance.
     """
     before, after = (float(np.mean(each[1:] * each[:-1])) for each in (values, rest.channel.means))
     if after < MOST_BESIDE_LEVELS * before and np.count_nonzero(np.diff(path)) > MANY_JUMPS * (path.max() + 1):

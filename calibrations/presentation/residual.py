@@ -251,7 +251,7 @@ class ChannelResidual:
         )
 
     def place(self, row: int) -> str:
-        """The pose of a row, and when it was."""
+        """The pose of a row, and its time."""
         return "<br>".join(_place(self.fit.table, row))
 
     def _text(self, row: int) -> str:

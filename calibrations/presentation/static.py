@@ -110,7 +110,7 @@ def draw(chart: c.Chart) -> Figure:
 
 
 def svg(chart: c.Chart) -> bytes:
-    """The chart as an SVG document; its text stays text, in a font that is as wide where the first is not there."""
+    """The chart as an SVG document. Text stays text; the fallback font has the same width."""
     page, figure = io.BytesIO(), draw(chart)
     figure.set_dpi(RC["savefig.dpi"])  # of pictures inside of it, such as the bar of a colour scale
     with rc_context(RC):  # `savefig` gives the same bytes, but draws the figure twice

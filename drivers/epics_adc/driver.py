@@ -34,9 +34,9 @@ OLDEST = 1.5  # periods since the first reading with a time stamp: two such cloc
 class Settings(Inputs[str], NoDigitalLines):
     """Channels as {name: record}, the record's name behind the beginning in the url.
 
-    Those `on_request` are there too, and are measured only for who asks for them. `volts_per_unit` converts the
-    engineering units of the records; without it the units must be V, mV or uV. `highest_severity` is the worst alarm
-    with which the rig goes on. Raises ValueError for what cannot be.
+    Inputs `on_request` are measured only if a procedure asks for them. `volts_per_unit` converts the engineering units
+    of the records; without it the units must be V, mV or uV. `highest_severity` is the worst alarm with which the rig
+    continues. Raises ValueError for impossible values.
     """
 
     channels: Mapping[str, str] = field(default_factory=lambda: {"vx": "ai1", "vy": "ai2"})
@@ -61,7 +61,8 @@ class AnalogRecords(Recorder[Settings]):
     """The records, read at the rate of the bench file."""
 
     def __init__(self, records: Records, links: Links, settings: Settings, name: str) -> None:
-        """Raises LinkRefused for a record that is not there, LimitError where its units are not those of a voltage."""
+        """Raises LinkRefused for a missing record, LimitError if its units are not those of a voltage."""
+
         self.name, self.settings = name, settings
         self._records, self._clock = records, links.clock
         self._volts = {channel: self._volts_per_unit(record) for channel, record in settings.wired.items()}

@@ -40,7 +40,7 @@ class MotorRecord(MotorStage):
     settings: Settings
 
     def __init__(self, records: Records, links: Links, settings: Settings, name: str) -> None:
-        """Raises LinkRefused for a record that is not there, LimitError where its units are not those of an angle."""
+        """Raises LinkRefused for a missing record, LimitError if its units are not those of an angle."""
         self.name, self.settings = name, settings
         self._records, self._clock = records, links.clock
         self._expected_end_s = 0.0
@@ -169,7 +169,7 @@ class MotorRecord(MotorStage):
         return Turn(rate_deg_s, WATCH_S, lambda: self._require_turning(rate_deg_s, at_deg, at_s))
 
     def _set(self, state: Mapping[str, Reading], field: str, value: float) -> None:
-        """Write a field that has another value, and read it back: the record keeps it within limits of its own."""
+        """Write a field if its value differs, and read it back, because the record has its own limits."""
         if math.isclose(state[field].value, value, rel_tol=CLOSE):
             return
         if not math.isclose(read_back := self._records.written(field, value), value, rel_tol=CLOSE):
@@ -179,7 +179,7 @@ class MotorRecord(MotorStage):
             )
 
     def _wait_until_done(self, timeout_s: float, failure: str) -> dict[str, Reading]:
-        """The state in which DMOV is 1. Raises NotSettled when it is not by then, StageAlarm."""
+        """Wait until DMOV is 1, and return the state. Raises StageAlarm; NotSettled after the time."""
         deadline = self._clock.now() + timeout_s
         while not (state := self._read(*STATE))[mr.DONE].value:
             self._require_no_alarm(state)
@@ -254,7 +254,7 @@ class MotorRecord(MotorStage):
             )
 
     def _require_turning(self, rate_deg_s: float, at_deg: float, at_s: float) -> None:
-        """Raises NotSettled where the readback is not where a turn would be that was at `at_deg` at `at_s`."""
+        """Raises NotSettled if the readback is off the path of a turn that was at `at_deg` at `at_s`."""
         self._require_movable(state := self._read(*STATE))
         travelled_deg = rate_deg_s * (self._clock.now() - at_s)
         off_deg = self._angle_deg(state) - (at_deg + travelled_deg)

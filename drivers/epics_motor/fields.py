@@ -41,7 +41,7 @@ class Settings(MotorSettings):
 
     `deg_per_unit` converts the engineering units of the record; without it the units must be those of an angle. `home`
     is the direction in which the motor seeks its zero; `none` for a motor whose position the IOC keeps.
-    `highest_severity` is the worst alarm with which the rig goes on. Raises ValueError for what no stage can be.
+    `highest_severity` is the worst alarm with which the rig goes on. Raises ValueError for impossible values.
     """
 
     limits_deg: tuple[float, float] = (-400.0, 400.0)

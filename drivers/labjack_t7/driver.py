@@ -33,7 +33,7 @@ class Settings(Inputs[int]):
     `interchannel_s` is from one channel of a scan to the next [M: measure it with one signal on two channels].
     `interlocks` are the digital lines of contacts that must be closed while anything moves, as {name: DIO number}. A
     closed contact pulls its line to ground; an open one, or a broken wire, lets it go high.
-    Raises ValueError for what no T7 has or can do.
+    Raises ValueError for impossible values.
     """
 
     channels: Mapping[str, int] = field(default_factory=lambda: {"vx": 0, "vy": 1, "supply": 2})

@@ -1,8 +1,7 @@
 """A rotary stage that is turned by hand to an angle on its dial: the stages of Ang V, resolution 5 arcmin.
 
-A person is its motor and its encoder: they are asked to set an angle, and confirm it, or type what the dial shows
-instead. What they read is what counts. A dial is absolute, so there is no homing; and a hand that is told nothing
-turns nothing, so there is nothing to stop.
+A person sets the requested angle, and confirms it or types the reading of the dial. The reading is the angle of the
+stage. A dial is absolute, so there is no homing. Without a request nobody turns the stage, so there is nothing to stop.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ UNIT = "deg"
 class Settings:
     """Settings of one stage: its dial, the tolerance of a reading, its limits, and the time of a move by hand.
 
-    Raises ValueError for what no stage can be.
+    Raises ValueError for impossible values.
     """
 
     resolution_deg: float = 5 / 60  # of the dial

@@ -44,7 +44,7 @@ class Settings(DigitalSettings):
     HIGHRES_IMU is in m/s^2, rad/s and gauss, SCALED_IMU in g, rad/s and gauss. The numbers of RAW_IMU are counts by the
     definition, and milli-g, mrad/s and mgauss from ArduPilot: `raw` must be `count` or `milli`. `imu` is the number
     (`id`) of the sensor in HIGHRES_IMU and RAW_IMU. `range` is the end of the accelerometer's range each way, in its
-    unit. Raises ValueError for what cannot be.
+    unit. Raises ValueError for impossible values.
     """
 
     message: Literal["HIGHRES_IMU", "SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3", "RAW_IMU"] = "HIGHRES_IMU"

@@ -177,7 +177,7 @@ class RotaryStage(MotorStage):
             )
 
     def _require_movable(self) -> int:
-        """The outputs of a drive that can be sent somewhere; raises why it cannot. It keeps its limits from now on."""
+        """The outputs of a drive that can move; raises the reason if it cannot. Writes the limits to the drive."""
         outputs = self._status()
         self._require_coordinates(outputs)
         self._require_ready(outputs)
@@ -251,7 +251,7 @@ class RotaryStage(MotorStage):
             self.wait()
 
     def _operate(self, kind: int, angle_deg: float, speed_deg_s: float) -> float:
-        """Write the direct operation, speeds in steps per second, which are its counts; when it began, s."""
+        """Write the direct operation, with speeds in steps per second. Returns the time at which it began."""
         per_deg = self.settings.steps_per_turn / 360
         rate, percent = self.settings.acceleration_deg_s2 * per_deg, self.settings.current_percent
         values = (0, kind, angle_deg * per_deg, speed_deg_s * per_deg, rate, rate, percent, az.TRIGGER_ALL)
@@ -298,7 +298,7 @@ class RotaryStage(MotorStage):
     def _poll_until(
         self, outputs_on: int, timeout_s: float, complaint: str, outputs: Callable[[], int] | None = None
     ) -> int:
-        """The outputs at a standstill with `outputs_on`; an alarm ends it unless `outputs` passes over it."""
+        """Wait for a standstill with `outputs_on`. Reads by `outputs`, or by `_status`, which raises StageAlarm."""
         deadline = self._clock.now() + timeout_s
         while True:
             if _is_at_rest(current := (outputs or self._status)(), outputs_on):
@@ -310,7 +310,7 @@ class RotaryStage(MotorStage):
 
 
 def _is_at_rest(outputs: int, outputs_on: int) -> bool:
-    """Whether it is at rest with `outputs_on`."""
+    """Whether the drive is at rest with `outputs_on`."""
     return not outputs & az.MOVE and outputs & outputs_on == outputs_on
 
 

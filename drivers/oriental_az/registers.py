@@ -149,7 +149,7 @@ class Settings(MotorSettings):
     With `own_limits`, `limits_deg` are written into the drive as its software limits and read back, before the first
     move: it brakes there by itself, whoever sent it. Off unless the bench file sets it.
 
-    Raises ValueError for what no stage can be.
+    Raises ValueError for impossible values.
     """
 
     steps_per_turn: int = 18000  # 1.2 arcmin a step [M]

@@ -30,7 +30,7 @@ SLOWEST_HZ = 1e-3  # a period of 1000 s; slower is a mistyped setting
 class Settings:
     """Axes as {name: the controller's identifier}, in the order of the wave generators; limits for each of them.
 
-    Raises ValueError for what no positioner can be.
+    Raises ValueError for impossible values.
     """
 
     axes: Mapping[str, str] = field(default_factory=lambda: {"x": "1", "y": "2", "z": "3"})

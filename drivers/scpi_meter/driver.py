@@ -49,7 +49,7 @@ class Settings(Inputs[int], NoDigitalLines):
     Those `on_request` are wired too, and are measured only for who asks for them. `nplc` is the time of one reading in
     periods of the mains. `interchannel_s` is from one channel of a scan to the next. `setup` are further commands,
     sent after those of the driver. `memory` is how many readings the instrument holds.
-    Raises ValueError for what cannot be.
+    Raises ValueError for impossible values.
     """
 
     channels: Mapping[str, int] = field(default_factory=lambda: {"vx": 101, "vy": 102})

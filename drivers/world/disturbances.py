@@ -1,7 +1,7 @@
 """Disturbances of the sensor that a model of a good sensor does not have, all off by default; and its supply.
 
 Each displaces the mass: charge on the plates from a certain time on; a cable that pulls in one sector of beta; a mount
-with two seats, of which gravity decides; a lid that pops in and out at random times; dust between the fingers.
+with two seats, between which gravity decides; a lid that snaps in and out at random times; dust between the fingers.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ class Settings(DigitalSettings):
 
     A record has the outputs of one sensor. Above 400 Hz they are the high-rate ones, which the tracker does not filter;
     the magnetometer has none. `range` is the end of the accelerometer's range each way, m/s^2. Raises ValueError for
-    what cannot be.
+    impossible values.
     """
 
     outputs: tuple[str, ...] = OUTPUTS

@@ -121,7 +121,7 @@ def rig() -> None:
 
 
 def last_joined(arguments: Sequence[str]) -> list[str]:
-    """The words with `last` and the name of a procedure as one, which a person need not put in quotes."""
+    """Join `last` and the name of a procedure after it to one word, so that a person need not type quotes."""
     words = list(arguments)
     if LAST in words[:-1]:
         from procedures.catalogue import paths

@@ -180,7 +180,7 @@ def require_sound(row: Row[Any], *tables: SqlTable, required: bool) -> Row[Any]:
 
 
 def place_text(row: Row[Any], table: SqlTable) -> str:
-    """The phrase about a row that changed on the disk."""
+    """The part of a message that names a row which changed on the disk."""
     place = f" {table.name[:-1]} {row.name!r}" if "name" in table.c else f" pose {row.number}"
     return f"run {row.run},{place}: its values changed on the disk ({table.name})"
 

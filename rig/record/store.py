@@ -101,7 +101,7 @@ class Record:
 
     @classmethod
     def to_find(cls, run: str, local_only: bool = False) -> Self:
-        """The record for reading, or only that of the rig, for a search. Does not make a record. Raises UnknownRun."""
+        """Open the record to search for a run, or only the rig's own one. Creates no record. Raises UnknownRun."""
         if not (home() / FILE).is_file() and (local_only or not cls.is_there()):
             raise UnknownRun(f"no run {run!r}: there is no record yet in {home()}; run a procedure first")
         return cls() if local_only else cls.to_read()

@@ -40,7 +40,7 @@ LABELS = {"t_s": "time (min)", "temperature_c": "temperature (°C)", "supply_v":
 
 
 def signature_chart(effect: Effect) -> Chart:
-    """A panel for each axis that the effect reaches; lines are coloured by inclination, and broken on the way back."""
+    """A panel for each axis that the effect changes; lines are coloured by inclination, and dashed on the way back."""
     parts = signature(effect)
     has_several = len(parts[0].curves) > 1
     panels = [_part_panel(part, legend=has_several and k == 0) for k, part in enumerate(parts)]
@@ -302,7 +302,7 @@ def shown_noise(effect: Effect) -> NoiseValues:
 
 
 def noise_signature_chart(effect: Effect) -> Chart:
-    """Left the Allan deviation, right the spectrum; broken without the effect."""
+    """The Allan deviation on the left, the spectrum on the right; dashed lines are without the effect."""
     white_fit, effect_fit = _with_white(None), _with_white(effect)
     tau_s = np.geomspace(1, SAMPLES / 8, 70).round() / RATE_HZ
     styles: tuple[tuple[ChannelFit, Dash, str], ...] = ((white_fit, "dash", QUIET), (effect_fit, "solid", BLUE))

@@ -24,7 +24,7 @@ def say_when_compiling() -> None:
 
 
 class _Watch(MetaPathFinder):
-    """Finds no module. At the first import after that of the compiler it begins to listen."""
+    """Waits until the compiler has been imported, then listens to its events. Finds no module itself."""
 
     def __init__(self) -> None:
         self.listens = False
