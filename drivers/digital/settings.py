@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
 from drivers.errors import LimitError
@@ -77,7 +78,23 @@ class DigitalSettings(NoDigitalLines):
             raise ValueError("most_lost must be a share of 0 or more, and less than 1")
 
 
-def require_outputs(outputs: Sequence[str]) -> None:
-    """Raises ValueError unless `outputs` are different outputs of OUTPUTS, at least one."""
-    if not outputs or not set(outputs) <= set(OUTPUTS) or len(set(outputs)) < len(outputs):
-        raise ValueError(f"outputs must be different outputs of {', '.join(OUTPUTS)}, at least one")
+@dataclass(frozen=True)
+class MessageSettings(DigitalSettings):
+    """Settings of a sensor whose messages have each output at a fixed place. Raises ValueError for wrong values."""
+
+    outputs: tuple[str, ...] = OUTPUTS
+    rate_hz: float = 100.0
+    range: float | None = None
+    most_lost: float = 0.01
+
+    def __post_init__(self) -> None:
+        self.require_valid()
+        if not self.outputs or not set(self.outputs) <= set(OUTPUTS) or len(set(self.outputs)) < len(self.outputs):
+            raise ValueError(f"outputs must be different outputs of {', '.join(OUTPUTS)}, at least one")
+
+    @property
+    def wired(self) -> Mapping[str, int | str]:
+        return {name: name for name in self.outputs}
+
+    def chosen(self, outputs: Sequence[str]) -> Self:
+        return replace(self, outputs=tuple(name for name in self.outputs if name in outputs))

@@ -36,8 +36,8 @@ class Settings(DigitalSettings):
     Columns of a gyroscope (gx, gy, gz) and a magnetometer (mx, my, mz) are recorded for procedures that ask for them.
     The columns supply and d63 are voltages of the board's converter. A column `temperature` is the sensor's, in C: it
     becomes the temperature of a pose. A column `time` is the sensor's own time, in units
-    of `time_unit_s`. `range` is the end of the accelerometer's range each way, in `unit`. Raises ValueError for what
-    cannot be.
+    of `time_unit_s`. `range` is the end of the accelerometer's range each way, in `unit`. Raises ValueError for
+    impossible values.
     """
 
     columns: Mapping[str, int | str] = field(default_factory=lambda: {"ax": 1, "ay": 2, "az": 3})

@@ -11,8 +11,7 @@ Source  MAVLink, message definitions `common`: HIGHRES_IMU, SCALED_IMU, RAW_IMU,
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 from drivers.digital.frames import FrameDecoder, Frames, Ints, groups
 from drivers.digital.reception import Batch, Floats, Numbers, Reception, TimeBase
 from drivers.digital.sensor import DigitalSensor, no_samples_error
-from drivers.digital.settings import OUTPUTS, DigitalSettings, require_outputs
+from drivers.digital.settings import OUTPUTS, MessageSettings
 from drivers.errors import DriverError, LinkTimeout, Refused, SensorFault
 from drivers.instrument import Identity
 from drivers.mavlink_imu import messages as mav
@@ -38,7 +37,7 @@ UPDATE_BITS = {name: 1 << k for k, name in enumerate(OUTPUTS)}  # bits of `field
 
 
 @dataclass(frozen=True)
-class Settings(DigitalSettings):
+class Settings(MessageSettings):
     """The message and its outputs: accelerometer (ax, ay, az), gyroscope (gx, gy, gz) and magnetometer (mx, my, mz).
 
     HIGHRES_IMU is in m/s^2, rad/s and gauss, SCALED_IMU in g, rad/s and gauss. The numbers of RAW_IMU are counts by the
@@ -48,24 +47,15 @@ class Settings(DigitalSettings):
     """
 
     message: Literal["HIGHRES_IMU", "SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3", "RAW_IMU"] = "HIGHRES_IMU"
-    outputs: tuple[str, ...] = OUTPUTS
-    rate_hz: float = 100.0
     raw: Literal["count", "milli"] | None = None
     imu: int = 0
-    range: float | None = None
-    most_lost: float = 0.01
 
     def __post_init__(self) -> None:
-        self.require_valid()
-        require_outputs(self.outputs)
+        super().__post_init__()
         if (self.message == "RAW_IMU") != (self.raw is not None):
             raise ValueError("raw must be `count` or `milli` with RAW_IMU, and is not for another message")
         if not 0 <= self.imu <= 255 or (self.imu and self.message.startswith("SCALED")):
             raise ValueError("imu must be 0 to 255; SCALED_IMU2 and SCALED_IMU3 are separate messages")
-
-    @property
-    def wired(self) -> Mapping[str, int | str]:
-        return {name: name for name in self.outputs}
 
     @property
     def kinds(self) -> tuple[str, str, str]:
@@ -81,9 +71,6 @@ class Settings(DigitalSettings):
     @property
     def time_unit_s(self) -> float:
         return 1e-3 if self.message.startswith("SCALED") else 1e-6
-
-    def chosen(self, outputs: Sequence[str]) -> Settings:
-        return replace(self, outputs=tuple(name for name in self.outputs if name in outputs))
 
 
 class SampleDecoder(FrameDecoder):

@@ -10,15 +10,14 @@ Source  Xsens MT Low Level Communication Protocol Documentation; Xsens MTi User 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from drivers.digital.frames import Bytes, FrameDecoder, Frames, Ints
 from drivers.digital.reception import Batch, Numbers, TimeBase
 from drivers.digital.sensor import DigitalSensor, no_samples_error
-from drivers.digital.settings import FIELDS, FORCES, OUTPUTS, RATES, DigitalSettings, require_outputs
+from drivers.digital.settings import FIELDS, FORCES, OUTPUTS, RATES, MessageSettings
 from drivers.errors import BadFrame, DriverError, LinkTimeout, Refused, StreamError
 from drivers.instrument import Identity
 from drivers.transport import Address, Links
@@ -46,7 +45,7 @@ NAMES = {xbus.ACCELERATION: "Acceleration", xbus.ACCELERATION_HR: "AccelerationH
 
 
 @dataclass(frozen=True)
-class Settings(DigitalSettings):
+class Settings(MessageSettings):
     """The outputs: accelerometer (ax, ay, az) in m/s^2, gyroscope (gx, gy, gz) in rad/s, magnetometer (mx, my, mz) in
     the tracker's arbitrary unit (`count`), which is about the strength of the earth's field.
 
@@ -55,20 +54,10 @@ class Settings(DigitalSettings):
     impossible values.
     """
 
-    outputs: tuple[str, ...] = OUTPUTS
-    rate_hz: float = 100.0
-    range: float | None = None
-    most_lost: float = 0.01
-
     def __post_init__(self) -> None:
-        self.require_valid()
-        require_outputs(self.outputs)
+        super().__post_init__()
         if not 1 <= self.rate_hz <= 2000 or self.rate_hz != round(self.rate_hz):
             raise ValueError("rate_hz must be a whole number of Hz, 1 to 2000")
-
-    @property
-    def wired(self) -> Mapping[str, int | str]:
-        return {name: name for name in self.outputs}
 
     @property
     def kinds(self) -> tuple[str, str, str]:
@@ -86,9 +75,6 @@ class Settings(DigitalSettings):
         rates = {kind: round(self.rate_hz) for names, kind in triads.items() if set(names) & set(self.channels)}
         with_each = dict.fromkeys((xbus.COUNTER, xbus.TIME, xbus.STATUS), xbus.MESSAGE_RATE)
         return with_each | {xbus.TEMPERATURE: 1} | rates
-
-    def chosen(self, outputs: Sequence[str]) -> Settings:
-        return replace(self, outputs=tuple(name for name in self.outputs if name in outputs))
 
 
 class SampleDecoder(FrameDecoder):
