@@ -239,10 +239,3 @@ def declination_deg(x: Array, y: Array) -> Array:
 def inclination_deg(x: Array, y: Array, z: Array) -> Array:
     """I, deg from the horizontal, positive downward. (17.10)"""
     return np.degrees(np.arctan2(z, horizontal(x, y)))
-
-
-def components(f: Array, d_deg: Array, i_deg: Array) -> tuple[Array, Array, Array]:
-    """X, Y, Z of a field of strength F, declination D and inclination I. (17.7), (17.8)"""
-    d, i = np.radians(d_deg), np.radians(i_deg)
-    h = f * np.cos(i)
-    return h * np.cos(d), h * np.sin(d), f * np.sin(i)

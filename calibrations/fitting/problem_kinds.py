@@ -41,7 +41,50 @@ class RateProblem(Problem):
         _check_changes(table, "each gyroscope output must change when the table turns; check its channel and its cable")
 
 
-class PositionProblem(Problem):
+class InverseProblem(Problem):
+    """Rows whose residual follows from the sensed quantity, which the model computes from the outputs."""
+
+    @property
+    def unit(self) -> str:
+        """The unit of the sensed quantity."""
+        return self.table.input_unit
+
+    @property
+    def adds(self) -> bool:
+        """The residual is not linear in any parameter."""
+        return False
+
+    def sensed(self, theta: Array) -> Array:
+        """The sensed quantity that the model computes from the outputs."""
+        steps = self.layout.steps(theta)
+        return sensed(backward(self.samples, steps), self.samples, steps)
+
+    def of_output(self, theta: Array, changes: Array) -> Array:
+        """Derivative of the residual with respect to each output."""
+        return self._response_to(self._chain_at(self.layout.steps(theta)))(changes)
+
+    def _response_to(self, chain: LinearisedChain) -> Callable[[Array], Array]:
+        """The function from changes of the outputs (samples, 3, m) to changes of the residual (channels, n, m)."""
+        raise NotImplementedError
+
+    def _chain_at(self, steps: Sequence[Step]) -> LinearisedChain:
+        """The linearised inverse of the chain: from the outputs to the sensed quantity."""
+        return LinearisedChain(self.samples, steps, backward(self.samples, steps))
+
+    def _changes_near(self, theta: Array, stairs: bool) -> Callable[[int, float, float], Array]:  # noqa: ARG002
+        """The response at the same sensed quantity changes; the residual follows it as it follows the outputs."""
+        chain = self._chain_at(self.layout.steps(theta))
+        response = self._response_to(chain)
+
+        def change(k: int, upper: float, lower: float) -> Array:
+            term = self.layout.slots[k].term
+            values = (self.layout.values_with(chain.steps[term][1], k, value) for value in (upper, lower))
+            return response(chain.change(term, *values)[:, :, None])[:, :, 0]
+
+        return change
+
+
+class PositionProblem(InverseProblem):
     """Magnitudes of the sensed quantity, of which only the strength is known."""
 
     signal = "magnitude"
@@ -66,49 +109,14 @@ class PositionProblem(Problem):
         """The magnitude."""
         return ("norm",)
 
-    @property
-    def unit(self) -> str:
-        """The unit of the sensed quantity."""
-        return self.table.input_unit
-
     def residual_by(self, steps: Sequence[Step]) -> Array:
         """The magnitude less the known one, shape (1, n)."""
         error: Array = np.linalg.norm(backward(self.table, steps), axis=1)[:, None] - 1.0
         return error.T
 
-    def sensed(self, theta: Array) -> Array:
-        """The sensed quantity that the model computes from the outputs."""
-        steps = self.layout.steps(theta)
-        return sensed(backward(self.table, steps), self.table, steps)
-
-    def _chain_at(self, steps: Sequence[Step]) -> LinearisedChain:
-        """The linearised inverse of the chain: from the outputs to the sensed quantity."""
-        return LinearisedChain(self.table, steps, backward(self.table, steps))
-
-    def of_output(self, theta: Array, changes: Array) -> Array:
-        """Derivative of the magnitude with respect to each output."""
-        return self._of_output(self._chain_at(self.layout.steps(theta)), changes)
-
-    def _of_output(self, chain: LinearisedChain, changes: Array) -> Array:
+    def _response_to(self, chain: LinearisedChain) -> Callable[[Array], Array]:
         by_output = magnitude_by_output(chain.static, self.table, chain.steps)
-        return np.asarray(-np.einsum("ni,nim->nm", by_output, changes)[None])
-
-    @property
-    def adds(self) -> bool:
-        """A magnitude is not linear in any parameter."""
-        return False
-
-    def _changes_near(self, theta: Array, stairs: bool) -> Callable[[int, float, float], Array]:  # noqa: ARG002
-        """The response at the same specific force changes; the magnitude follows it as it follows the output."""
-        chain = self._chain_at(self.layout.steps(theta))
-        by_response = self._of_output(chain, np.tile(np.eye(3), (self.table.n, 1, 1)))
-
-        def change(k: int, upper: float, lower: float) -> Array:
-            term = self.layout.slots[k].term
-            values = (self.layout.values_with(chain.steps[term][1], k, value) for value in (upper, lower))
-            return np.asarray(np.sum(by_response * chain.change(term, *values), axis=2))
-
-        return change
+        return lambda changes: np.asarray(-np.einsum("ni,nim->nm", by_output, changes)[None])
 
     def _white(self, std: Array) -> Array:
         return norm_std(self.table, std).T / self.layout.nominal
@@ -139,8 +147,9 @@ class FieldProblem(PositionProblem):
         strengths = [float(p["total"]) for effect, p in steps if effect.name == STRENGTH]
         return strengths[0] / self.layout.nominal if strengths else 1.0
 
-    def _of_output(self, chain: LinearisedChain, changes: Array) -> Array:
-        return super()._of_output(chain, changes) * self._strength(chain.steps)
+    def _response_to(self, chain: LinearisedChain) -> Callable[[Array], Array]:
+        response, strength = super()._response_to(chain), self._strength(chain.steps)
+        return lambda changes: response(changes) * strength
 
     def _changes_near(self, theta: Array, stairs: bool) -> Callable[[int, float, float], Array]:
         """The strength itself changes the measure of the magnitude as well."""
@@ -211,7 +220,7 @@ class MotionProblem(SummedProblem):
 
 
 @dataclass(frozen=True)
-class TurnProblem(SummedProblem):
+class TurnProblem(InverseProblem, SummedProblem):
     """Turns between rests, as the rates by the model make them."""
 
     table: Turns
@@ -237,46 +246,15 @@ class TurnProblem(SummedProblem):
 
         return CHANNELS
 
-    @property
-    def unit(self) -> str:
-        """The unit of a rate."""
-        return self.table.input_unit
-
     def residual_by(self, steps: Sequence[Step]) -> Array:
         """The residual of turns and rests, shape (channels, n)."""
         return self.table.residual(backward(self.samples, steps))
 
-    def sensed(self, theta: Array) -> Array:
-        """The rates that the model computes from the outputs."""
-        steps = self.layout.steps(theta)
-        return sensed(backward(self.samples, steps), self.samples, steps)
-
-    def of_output(self, theta: Array, changes: Array) -> Array:
-        """Derivative of the rates with respect to each output."""
-        by_response = self._by_response(self._chain_at(self.layout.steps(theta)))
-        return self.table.add_up(by_response @ changes)
-
-    def _chain_at(self, steps: Sequence[Step]) -> LinearisedChain:
-        """The linearised inverse of the chain: from the outputs to the rates."""
-        return LinearisedChain(self.samples, steps, backward(self.samples, steps))
-
-    def _by_response(self, chain: LinearisedChain) -> Array:
-        """Derivative of each turn's residual with respect to the response per sample, (samples, channels, 3)."""
+    def _response_to(self, chain: LinearisedChain) -> Callable[[Array], Array]:
         slope = slope_at(chain.static, self.samples, chain.steps)
         by_rate = self.table.by_rate(chain.static).transpose(0, 2, 1)
-        return np.asarray(-np.linalg.solve(slope.transpose(0, 2, 1), by_rate).transpose(0, 2, 1))
-
-    def _changes_near(self, theta: Array, stairs: bool) -> Callable[[int, float, float], Array]:  # noqa: ARG002
-        """The response at the same rates changes; the rates follow it as they follow the output."""
-        chain = self._chain_at(self.layout.steps(theta))
-        by_response = self._by_response(chain)
-
-        def change(k: int, upper: float, lower: float) -> Array:
-            term = self.layout.slots[k].term
-            values = (self.layout.values_with(chain.steps[term][1], k, value) for value in (upper, lower))
-            return self.table.add_up(by_response @ chain.change(term, *values)[:, :, None])[:, :, 0]
-
-        return change
+        by_output = -np.linalg.solve(slope.transpose(0, 2, 1), by_rate).transpose(0, 2, 1)  # (samples, channels, 3)
+        return lambda changes: self.table.add_up(by_output @ changes)
 
 
 PROBLEMS: Mapping[str, type[Problem]] = MappingProxyType(

@@ -65,10 +65,6 @@ class Script:
         self.segments = [replace(s, end_s=min(s.end_s, now_s)) for s in recent]
         self._plan(attitude[:, 2], attitude[:, 0], place_mm, now_s, self._hand.reaction_s)
 
-    def force_g(self, times_s: Floats) -> Floats:
-        """Specific force in the frame of the sensor at rising times (n,), shape (n, 3)."""
-        return self.motion(times_s).force_g
-
     def up(self, times_s: Floats) -> Floats:
         """Directions upward at rising times (n,), shape (n, 3)."""
         return np.asarray(self.motion(times_s).attitude[:, :, 2])

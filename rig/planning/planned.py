@@ -226,11 +226,10 @@ class PlannedLevel:
 
 
 class PlannedPositioner:
-    """A planned positioner: it is at the last target, and refuses the same targets as its driver."""
+    """A planned positioner, which refuses the same targets as its driver."""
 
     def __init__(self, name: str, settings: Any, ledger: Ledger) -> None:
         self._name, self._settings, self._ledger = name, settings, ledger
-        self._at_um: dict[str, float] = {}
 
     def servo(self, on: bool) -> None:
         self._ledger.add(f"{self._name} servo {'on' if on else 'off'}", EXCHANGE_S)
@@ -238,10 +237,6 @@ class PlannedPositioner:
     def move_to(self, axis: str, um: float) -> None:
         self._require_within(axis, um)
         self._ledger.add(f"{self._name} moves {axis} to {um:g} um", EXCHANGE_S)
-        self._at_um[axis] = um
-
-    def position_um(self, axis: str) -> float:
-        return self._at_um.get(axis, 0.0)
 
     def oscillate(self, axis: str, *, peak_to_peak_um: float, frequency_hz: float, centre_um: float) -> float:
         self._require_within(axis, centre_um - peak_to_peak_um / 2, centre_um + peak_to_peak_um / 2)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from calibrations.analyses.magnetometer_turn import (
-    components,
     correct_by_extremes,
     declination_deg,
     estimate_hard_iron,
@@ -170,9 +169,11 @@ def test_the_constant_triad_chooses_between_accelerometer_and_magnetometer() -> 
 
 def test_components_of_a_field_give_its_elements() -> None:
     # Potsdam, 2020, as the IGRF gives it: F 49,600 nT, D 4.5, I 67.9 deg
-    x, y, z = components(np.array(49600.0), np.array(4.5), np.array(67.9))
+    d, i = np.radians(4.5), np.radians(67.9)
+    x, y, z = 49600.0 * np.array([np.cos(i) * np.cos(d), np.cos(i) * np.sin(d), np.sin(i)])
     assert (float(x), float(y), float(z)) == pytest.approx((18603.0, 1464.1, 45955.0), rel=1e-3)
     assert total(x, y, z) == pytest.approx(49600.0)
+    assert declination_deg(x, y) == pytest.approx(4.5)
     assert horizontal(x, y) == pytest.approx(49600.0 * np.cos(np.radians(67.9)))
     assert inclination_deg(x, y, z) == pytest.approx(67.9)
     assert declination_deg(np.array(-1.0), np.array(-1.0)) == pytest.approx(-135.0)  # the quadrant that atan loses

@@ -27,13 +27,13 @@ def script(hand: Hand = CALM, seed: int = 1) -> Script:
 
 def test_it_lies_still_until_it_is_told_to_turn() -> None:
     hand = script()
-    assert hand.force_g(TIMES_S) == pytest.approx(np.tile([0.0, 0.0, 1.0], (len(TIMES_S), 1)))
+    assert hand.motion(TIMES_S).force_g == pytest.approx(np.tile([0.0, 0.0, 1.0], (len(TIMES_S), 1)))
 
 
 def test_it_turns_the_sensor_trembling_and_then_lets_go() -> None:
     hand = script()
     hand.turn_to(EDGE, 0.0)
-    force = hand.force_g(TIMES_S[:700])
+    force = hand.motion(TIMES_S[:700]).force_g
     assert force[:70].std(axis=0).max() < 1e-9  # the reaction
     assert np.linalg.norm(force[120:180], axis=1).std() > 0.01  # turning
     assert force[-100:] == pytest.approx(np.tile(EDGE, (100, 1)), abs=1e-6)
@@ -42,7 +42,7 @@ def test_it_turns_the_sensor_trembling_and_then_lets_go() -> None:
 def test_an_impatient_hand_tries_again_without_being_told() -> None:
     hand = script(replace(CALM, patience_s=2.0))
     hand.turn_to(EDGE, 0.0)
-    moving = np.linalg.norm(np.diff(hand.force_g(np.arange(0.0, 60.0, 0.01)), axis=0), axis=1) > 1e-3
+    moving = np.linalg.norm(np.diff(hand.motion(np.arange(0.0, 60.0, 0.01)).force_g, axis=0), axis=1) > 1e-3
     windows = moving[: 100 * (len(moving) // 100)].reshape(-1, 100).any(axis=1)
     assert np.sum(np.diff(windows.astype(int)) == 1) >= 4
 

@@ -14,7 +14,7 @@ from calibrations.discovery.results import Diagnosis, Discovery
 from calibrations.discovery.summary import step_shares
 from calibrations.discovery.verdict import Verdict
 from calibrations.fitting.fit import Fit, milli_unit, pool_in_milli
-from calibrations.presentation.views.view import View
+from calibrations.presentation.views.view import View, candidate_cells
 from calibrations.text import Cells, quantity, rounded
 
 if TYPE_CHECKING:
@@ -75,20 +75,8 @@ class RowsView(View[Fit]):
         return ("model", "error / floor", self.data.unseen, "share", ""), rows
 
     def candidate_table(self, diagnosis: Diagnosis[Fit], candidates: Sequence[Candidate]) -> Cells:
-        """Held-out error, chance and probability of each candidate."""
         chance = "if it is one of these" if diagnosis.verdict is Verdict.UNEXPLAINED else "probability"
-        rows = [
-            (
-                c.name,
-                f"{diagnosis.held_out_before:.3g} -> {c.held_out_after:.3g}",
-                f"{c.p_value:.1g}",
-                f"{c.probability:.3f}",
-                ", ".join(c.indistinguishable_from) or "-",
-            )
-            for c in candidates
-        ]
-        head = ("candidate", f"error on {self.data.unseen} / floor", "p-value", chance, "cannot be separated from")
-        return head, rows
+        return candidate_cells(diagnosis, candidates, f"error on {self.data.unseen} / floor", chance)
 
     def fit_chart(self, fit: Fit) -> Chart:
         """The residual."""

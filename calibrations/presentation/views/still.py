@@ -11,7 +11,7 @@ from calibrations.discovery.findings import Candidate
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
 from calibrations.noise.comparison import compared_deviations, mismatch
 from calibrations.noise.fit import NoiseFit
-from calibrations.presentation.views.view import View
+from calibrations.presentation.views.view import View, candidate_cells
 from calibrations.text import Cells, quantity, rounded
 
 if TYPE_CHECKING:
@@ -79,23 +79,8 @@ class StillView(View[NoiseFit]):
         return tuple(HEAD[k] for k in column_numbers), [tuple(row[k] for k in column_numbers) for row in rows]
 
     def candidate_table(self, diagnosis: Diagnosis[NoiseFit], candidates: Sequence[Candidate]) -> Cells:
-        """Held-out mismatch, gain, chance and probability of each candidate."""
-        rows = [
-            (
-                c.name,
-                f"{diagnosis.held_out_before:.3g} -> {c.held_out_after:.3g}",
-                f"{c.gain / 2:.4g}" if c.gain > 1e-6 else "0",
-                f"{c.p_value:.1g}",
-                f"{c.probability:.3f}",
-                ", ".join(c.indistinguishable_from) or "-",
-            )
-            for c in candidates
-        ]
-        head = (
-            "candidate", f"mismatch on {self.data.unseen} / chance", "log-likelihood", "p-value", "probability",
-            "cannot be separated from",
-        )  # fmt: skip
-        return head, rows
+        error = f"mismatch on {self.data.unseen} / chance"
+        return candidate_cells(diagnosis, candidates, error, "probability", gains=True)
 
     def fit_chart(self, fit: NoiseFit) -> Chart:
         """Measured and modelled Allan deviations."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Generic
+from typing import TYPE_CHECKING, Any, Generic
 
 from calibrations.discovery.findings import Candidate, F
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
@@ -39,7 +39,7 @@ class View(ABC, Generic[F]):
 
     @abstractmethod
     def candidate_table(self, diagnosis: Diagnosis[F], candidates: Sequence[Candidate]) -> Cells:
-        """The candidates, as text."""
+        """The held-out error, chance and probability of each candidate, as text."""
 
     @abstractmethod
     def fit_chart(self, fit: F) -> Chart:
@@ -56,3 +56,22 @@ class View(ABC, Generic[F]):
     @abstractmethod
     def steps_album(self, discovery: Discovery[F]) -> list[Picture]:
         """The pictures of a discovery, with captions."""
+
+
+def candidate_cells(
+    diagnosis: Diagnosis[Any], candidates: Sequence[Candidate], error: str, probability: str, gains: bool = False
+) -> Cells:
+    """A row for each candidate. `error` and `probability` are heads of columns; `gains`: with the log-likelihoods."""
+    rows = [
+        (
+            c.name,
+            f"{diagnosis.held_out_before:.3g} -> {c.held_out_after:.3g}",
+            *((f"{c.gain / 2:.4g}" if c.gain > 1e-6 else "0",) if gains else ()),
+            f"{c.p_value:.1g}",
+            f"{c.probability:.3f}",
+            ", ".join(c.indistinguishable_from) or "-",
+        )
+        for c in candidates
+    ]
+    gain_head = ("log-likelihood",) if gains else ()
+    return ("candidate", error, *gain_head, "p-value", probability, "cannot be separated from"), rows
