@@ -19,10 +19,11 @@ Input = TypeVar("Input", int, str)  # a number, or the name of a record
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """A record: `volts` of shape (n, channels), the first scan at `start_s` of the clock.
+    """A block of samples: `volts`, shape (n, channels), the first at `start_s` of the clock.
 
-    Of a sensor that sends its own values, `volts` are in the unit of its settings. `temperature_c` is what the sensor
-    itself reports; None if it does not. `lost`: number of samples that are missing in or near this block.
+    Of a digital sensor, `volts` are in the unit of its settings. `temperature_c` is the temperature that the sensor
+    reports; None if it reports none. `lost`: number of samples that are missing in or near this block. The record keeps
+    neither: the temperature is that of the pose.
     """
 
     volts: NDArray[np.float64]
@@ -135,7 +136,7 @@ class Recorder(Generic[Settings]):
             blocks = [next(stream)]
             value = reading()
             blocks += stream
-        return _join(blocks), value
+        return join_samples(blocks), value
 
     def acquire_watched(self, duration_s: float, watch: Callable[[], object], every_s: float) -> Samples:
         """Acquire samples; call `watch` about every `every_s` and at the end. An error of `watch` ends the record."""
@@ -144,10 +145,11 @@ class Recorder(Generic[Settings]):
             for block in stream:
                 watch()
                 blocks.append(block)
-        return _join(blocks)
+        return join_samples(blocks)
 
 
-def _join(blocks: Sequence[Samples]) -> Samples:
+def join_samples(blocks: Sequence[Samples]) -> Samples:
+    """Successive blocks as one."""
     first = blocks[0]
     volts = np.concatenate([block.volts for block in blocks])
     reported = [block.temperature_c for block in blocks if block.temperature_c is not None]

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.recorder import Samples, join_samples
 from procedures.bounds import require_possible
 from procedures.errors import NoAnswer, SettingError
-from procedures.instruments import Samples
 from procedures.session import Dwell, Guidance, HandAnalysis, HandCourse, NoiseAtRest, Pose, Session
 
 WINDOW_S = 0.5  # of a test of rest
@@ -27,28 +27,6 @@ TRIES = 2  # rests at known positions before another orientation is wanted
 FLAT = (0.0, 0.0, 1.0)
 
 Course = Callable[[Sequence[Dwell], NoiseAtRest, Sequence[str]], HandCourse]
-
-
-@dataclass(frozen=True)
-class Windows:
-    """Successive windows, as one block of samples."""
-
-    volts: NDArray[np.float64]
-    channels: Sequence[str]
-    rate_hz: float
-    start_s: float
-    temperature_c: float | None
-    lost: int = 0
-
-    @staticmethod
-    def of(windows: Sequence[Samples]) -> Windows:
-        """All `windows` joined."""
-        first = windows[0]
-        volts = np.concatenate([w.volts for w in windows])
-        reported = [w.temperature_c for w in windows if w.temperature_c is not None]
-        temperature_c = float(np.mean(reported)) if reported else None
-        lost = sum(w.lost for w in windows)
-        return Windows(volts, first.channels, first.rate_hz, first.start_s, temperature_c, lost)
 
 
 @dataclass(frozen=True)
@@ -156,7 +134,7 @@ def learn_noise(rig: Session, analysis: HandAnalysis, wait_s: float, *triads: Se
 
 def _find_next_rest(
     rig: Session, analysis: HandAnalysis, course: HandCourse, noise: NoiseAtRest, goal: Goal
-) -> Windows | None:
+) -> Samples | None:
     """The next rest at a new position. The first window of a rest is left out: the hand has just let go.
 
     None after TRIES rests at known positions: an earlier position was not the one that the person was told, and is the
@@ -176,7 +154,7 @@ def _find_next_rest(
                 return None
         elif len(windows) * WINDOW_S <= goal.rest_s:
             doing.say(f"{course.words}: at rest, wait")
-        elif course.is_new((candidate := Windows.of(windows[1:])).volts.mean(axis=0)):
+        elif course.is_new((candidate := join_samples(windows[1:])).volts.mean(axis=0)):
             return candidate
         else:
             refusals += not doing.text.startswith(KNOWN)

@@ -15,19 +15,19 @@ from contextlib import closing
 from dataclasses import dataclass, field, replace
 
 from drivers.errors import LimitError
+from drivers.recorder import Samples, join_samples
 from procedures.at_rest import (
     FEWEST,
     WINDOW_S,
     Goal,
     PresentStep,
-    Windows,
     guidance,
     learn_noise,
     outputs_of,
     require_analysis,
 )
 from procedures.errors import NoAnswer
-from procedures.instruments import Adc, Samples
+from procedures.instruments import Adc
 from procedures.session import HandAnalysis, HandCourse, NoiseAtRest, Pose, Session
 
 KIND = "turns"
@@ -112,7 +112,7 @@ class Watch:
                 doing.say(f"{course.words}: the sensor moves ({motion})")
             elif len(self.rest) <= self._count:
                 doing.say(f"{course.words}: at rest, wait")
-            elif course.is_new(outputs_of(Windows.of(self.rest[1:]), FORCES).mean(axis=0)):
+            elif course.is_new(outputs_of(join_samples(self.rest[1:]), FORCES).mean(axis=0)):
                 return
             else:
                 doing.say(f"the sensor lies as before; needed: {course.words}")
@@ -125,11 +125,11 @@ class Watch:
         temperature_c = self.rig.oven.temperature_c()
         self.remark = ""
         if self.before:
-            turned = Windows.of([*self.before, *self.turn, *self.rest[:1]])
+            turned = join_samples([*self.before, *self.turn, *self.rest[:1]])
             self.remark = self._fault(turned)
             path = f"{self.remark}: {TURN}{words}" if self.remark else f"{TURN}{words}"
             self.rig.keep(Pose(0.0, 0.0, path=path), samples=turned, temperature_c=temperature_c)
-        self.rig.keep(Pose(0.0, 0.0, path=words), samples=Windows.of(self.rest[1:]), temperature_c=temperature_c)
+        self.rig.keep(Pose(0.0, 0.0, path=words), samples=join_samples(self.rest[1:]), temperature_c=temperature_c)
 
     def _take(self, window: Samples) -> str | None:
         """Add a window; None if it is at rest, else by how much it is not, in words."""
@@ -148,12 +148,12 @@ class Watch:
         self.rest = []
         return f"{moving.noise:.2g} times the noise at rest, by {moving.by}"
 
-    def _fault(self, turned: Windows) -> str:
+    def _fault(self, turned: Samples) -> str:
         """Why this turn cannot be used, in words; empty if it can."""
         if turned.lost:
             return f"{turned.lost} samples were lost during the turn"
-        at_rest = outputs_of(Windows.of(self.before), RATES)
-        moving = outputs_of(Windows.of(self.turn), RATES)
+        at_rest = outputs_of(join_samples(self.before), RATES)
+        moving = outputs_of(join_samples(self.turn), RATES)
         if (output := self.analysis.clipped(moving, at_rest)) is not None:
             return f"{RATES[output]} reached the end of its range, turn more slowly"
         return ""

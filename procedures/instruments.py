@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Generator, Sequence
+from collections.abc import Callable, Collection, Generator
 from contextlib import AbstractContextManager
-from typing import Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    from drivers.motor_stage import Turn
+    from drivers.recorder import Samples
+
+__all__ = [
+    "OUTPUTS",
+    "Adc",
+    "Clock",
+    "Level",
+    "Oven",
+    "Positioner",
+    "Read",
+    "Samples",
+    "Stage",
+    "Tilt",
+    "Turn",
+    "output_channel",
+]
 
 Read = TypeVar("Read")
-
-
-class Samples(Protocol):
-    """A block of samples: `volts`, shape (n, channels); `start_s` is the clock's time of the first sample.
-
-    Of a digital sensor, `volts` are in the unit of the sensor, and `temperature_c` is what it reports; None if it does
-    not. `lost`: number of samples that are missing in or near this block.
-    """
-
-    @property
-    def volts(self) -> NDArray[np.float64]: ...
-    @property
-    def channels(self) -> Sequence[str]: ...
-    @property
-    def rate_hz(self) -> float: ...
-    @property
-    def start_s(self) -> float: ...
-    @property
-    def temperature_c(self) -> float | None: ...
-    @property
-    def lost(self) -> int: ...
 
 
 OUTPUTS = (("vx", "vy", "vz"), ("ax", "ay", "az"))  # of an analog accelerometer, and of a digital one
@@ -39,17 +34,6 @@ OUTPUTS = (("vx", "vy", "vz"), ("ax", "ay", "az"))  # of an analog accelerometer
 def output_channel(axis: str, channels: Collection[str]) -> str | None:
     """The channel of the accelerometer's output along "x", "y" or "z"; None if the sensor does not have this axis."""
     return next((names["xyz".index(axis)] for names in OUTPUTS if names["xyz".index(axis)] in channels), None)
-
-
-class Turn(Protocol):
-    """A turn at a constant rate, in progress. `require` must be called every `beat_s`; it raises if the turn stops."""
-
-    @property
-    def rate_deg_s(self) -> float: ...
-    @property
-    def beat_s(self) -> float: ...
-    @property
-    def require(self) -> Callable[[], None]: ...
 
 
 class Stage(Protocol):

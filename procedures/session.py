@@ -14,9 +14,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.recorder import Samples
 from procedures.bounds import require_bounded
 from procedures.errors import Declined, SafetyLimit, SettingError
-from procedures.instruments import Adc, Clock, Level, Oven, Positioner, Samples, Stage
+from procedures.instruments import Adc, Clock, Level, Oven, Positioner, Stage
 from procedures.questions import EDGES, Confirm, Mounting, Number, Question
 
 SHORTEST_APPROACH_DEG = 0.5  # a shorter move does not take up the gear play

@@ -24,16 +24,15 @@ from calibrations.table import Array, Table
 from drivers.handheld.hand import Hand
 from drivers.handheld.triad import noise_v, steady_v
 from drivers.handheld.world import FIELDS, FORCES, Handheld, HandheldWorld
+from drivers.recorder import Samples
 from drivers.world import turned_sensors
 from drivers.world.config import WorldConfig
 from drivers.world.kernel import record
 from procedures.hand_fields import hand_fields
 from procedures.hand_positions import hand_positions
 from procedures.hand_turns import hand_turns
-from procedures.instruments import Samples
 from rig.instruments.by_hand import HandAnalysis
 from rig.record.turns import is_turn, turn_columns
-from rig.record.values import Block
 from tests.procedures.bench import Adc, Book, session
 
 RATE_HZ = 200.0
@@ -76,12 +75,12 @@ class SlowAdc(Adc):
     def acquire(self, duration_s: float) -> Samples:
         start_s, n = self.world.now_s, round(duration_s * RATE_HZ)
         volts = self.world.adc_volts(self.channels, start_s, 1 / RATE_HZ, n)
-        return Block(volts, self.channels, RATE_HZ, start_s)
+        return Samples(volts, self.channels, RATE_HZ, start_s)
 
     def stream(self, duration_s: float, block_s: float) -> Generator[Samples, None, None]:
         begin_s, n = self.world.now_s, round(block_s * RATE_HZ)
         for start_s in begin_s + block_s * np.arange(round(duration_s / block_s)):
-            yield Block(self.world.adc_volts(self.channels, start_s, 1 / RATE_HZ, n), self.channels, RATE_HZ, start_s)
+            yield Samples(self.world.adc_volts(self.channels, start_s, 1 / RATE_HZ, n), self.channels, RATE_HZ, start_s)
 
 
 def world_of(seed: int, hand: Hand | None = None) -> HandheldWorld:

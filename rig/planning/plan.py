@@ -17,8 +17,8 @@ from typing import Any
 
 from calibrations.errors import DataError
 from calibrations.geometry.error_table import ErrorTable
+from drivers.recorder import Samples
 from procedures.catalogue import Procedure
-from procedures.instruments import Samples
 from procedures.questions import Dial, Question
 from procedures.session import Dwell, Guidance, Pose, RecordedPose, Session
 from rig.bench import ROLES, SIMULATED, TURNING, Bench

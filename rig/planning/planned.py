@@ -17,13 +17,12 @@ from drivers.instrument import OUTSIDE_ANGLE, OUTSIDE_POSITION, OUTSIDE_TEMPERAT
 from drivers.labjack_t7.driver import Settings as AdcSettings
 from drivers.motor_stage import Turn
 from drivers.omega_cn7500.driver import Settings as OvenSettings
+from drivers.recorder import Samples
 from procedures.bounds import MOST_POSES
-from procedures.instruments import Samples
 from procedures.questions import Choice, Number, Question
 from procedures.session import SHORTEST_APPROACH_DEG, Dwell, Guidance, Pose, Reading, RecordedPose
 from rig.bench import Bench
 from rig.errors import PlanError
-from rig.record.values import Block
 
 LEVEL_S = 1.0  # a reading of the level
 ROOM_C = 25.0
@@ -172,7 +171,7 @@ class PlannedAdc:
         for k in range(count):  # a record may be ended before its last block
             self._ledger.now_s += duration_s / count
             self._ledger.samples += max(1, round(duration_s / count * rate_hz)) * len(names)
-            yield Block(np.zeros((1, len(names))), names, rate_hz, start_s + k * block_s)
+            yield Samples(np.zeros((1, len(names))), names, rate_hz, start_s + k * block_s)
 
     def power(self, on: bool) -> None:
         if self._settings.power_dio is None:

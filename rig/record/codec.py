@@ -17,7 +17,7 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
-from procedures.instruments import Samples
+from drivers.recorder import Samples
 
 CODEC = "palette-zlib/1"
 MOST_BYTES = 1 << 30  # of a block before compression: a hundred times the longest recorded block

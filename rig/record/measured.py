@@ -14,6 +14,7 @@ import numpy as np
 from calibrations.table import Array, Table
 from calibrations.tables import KINDS
 from drivers.errors import did_you_mean
+from drivers.recorder import Samples
 from procedures.questions import EDGES
 from procedures.session import Pose, Reading
 from procedures.soak import POWER_ON
@@ -23,7 +24,7 @@ from rig.record import tables
 from rig.record.store import Record
 from rig.record.tables import MOST_BLOCKS, inflations, poses_table, samples_table, stated_unit, units_of
 from rig.record.turns import turn_columns
-from rig.record.values import CHANGED, Block, KeptPose, Run
+from rig.record.values import CHANGED, KeptPose, Run
 
 # The table of a magnetometer or a gyroscope.
 #
@@ -235,5 +236,5 @@ def of_sensor(recorded: KeptPose, sensor: str | None) -> KeptPose:
     samples = recorded.samples
     names = {name.removeprefix(f"{sensor}."): k for k, name in enumerate(samples.channels)}
     own_channels = {name: k for name, k in names.items() if "." not in name}
-    block = Block(samples.volts[:, list(own_channels.values())], tuple(own_channels), samples.rate_hz, samples.start_s)
-    return replace(recorded, samples=block)
+    volts = samples.volts[:, list(own_channels.values())]
+    return replace(recorded, samples=Samples(volts, tuple(own_channels), samples.rate_hz, samples.start_s))

@@ -26,6 +26,7 @@ from sqlalchemy import (
 from sqlalchemy import Table as SqlTable
 
 from drivers.errors import did_you_mean
+from drivers.recorder import Samples
 from procedures.session import Dwell, Pose
 from rig.errors import RecordError, UnknownRun
 from rig.record import codec
@@ -44,7 +45,7 @@ from rig.record.schema import (
     runs,
     states,
 )
-from rig.record.values import Block, Event, KeptPose, Run
+from rig.record.values import Event, KeptPose, Run
 
 MOST_LISTED = 5
 MOST_SUGGESTED = 20  # names of a kind from which a suggestion is chosen
@@ -276,7 +277,7 @@ def kept_of(row: Row[Any]) -> KeptPose:
     except ValueError as error:
         raise RecordError(f"{place}: {error}; restore a copy of the record") from None
     pose = pose_of(row)
-    block = Block(volts, tuple(row.channels), row.rate_hz, row.start_s)
+    block = Samples(volts, tuple(row.channels), row.rate_hz, row.start_s)
     return KeptPose(
         pose, block, excluded=row.excluded, number=row.number, **{name: row._mapping[name] for name in KEPT_COLUMNS}
     )

@@ -19,7 +19,8 @@ from calibrations.geometry.error_table import ErrorTable
 from calibrations.means.noise import measured_inflation
 from calibrations.table import Array, Table, std_column
 from calibrations.tables import KINDS
-from procedures.instruments import OUTPUTS, Samples
+from drivers.recorder import Samples
+from procedures.instruments import OUTPUTS
 from rig.bench import D63, TURNING, Bench, Instrument
 from rig.errors import RecordError
 from rig.record.values import KeptPose, Run

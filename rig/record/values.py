@@ -8,10 +8,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibrations.text import as_written
-from procedures.instruments import Samples
+from drivers.recorder import Samples
 from procedures.session import Dwell, Pose
 
 
@@ -72,18 +71,6 @@ class Run:
             "rates": f"{self.rows} turns",
             "turns": f"{self.rows} turns and rests",
         }.get(self.kind, f"{self.rows} poses and blocks")
-
-
-@dataclass(frozen=True)
-class Block:
-    """A block of samples: `volts`, shape (n, channels), from `start_s` on the clock."""
-
-    volts: NDArray[np.float64]
-    channels: tuple[str, ...]
-    rate_hz: float
-    start_s: float
-    temperature_c: float | None = None  # in the record it is that of the pose
-    lost: int = 0  # samples that are missing; not in the record
 
 
 @dataclass(frozen=True)

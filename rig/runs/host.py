@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
-from procedures.instruments import Samples
+from drivers.recorder import Samples
 from procedures.questions import Question
 from procedures.session import Dwell, Guidance, Pose, Reading, RecordedPose
 from rig.errors import RunMismatch

@@ -21,8 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.errors import SensorFault
+from drivers.recorder import Samples
 from procedures import hand_turns, motion
-from procedures.instruments import OUTPUTS, Samples
+from procedures.instruments import OUTPUTS
 from procedures.session import Dwell, Pose
 from rig.record.measured import specific_force_g
 

@@ -26,8 +26,9 @@ from urllib.parse import quote
 import numpy as np
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
+from drivers.recorder import Samples
 from procedures.session import Pose
-from rig.record import Block, KeptPose, Record
+from rig.record import KeptPose, Record
 from tests.browser.measured import hidden, hundred_thousand, thousand
 from tests.browser.test_run_page import begin
 
@@ -121,7 +122,7 @@ def _night() -> str:
         for number in range(BLOCKS):
             drift = 2.5 + 0.01 * np.exp(-number / 900)
             volts = np.round((drift + 8e-4 * rng.standard_normal((IN_A_BLOCK, 1))) / STEP_V) * STEP_V
-            block = Block(volts, ("vx",), RATE_HZ, 10.0 * number)
+            block = Samples(volts, ("vx",), RATE_HZ, 10.0 * number)
             record.keep(run, number, KeptPose(Pose(0, 0, 0, f"hold {number}"), block, 10.0 * number, 22.0), None)
         record.set_state(run, "complete")
     return run

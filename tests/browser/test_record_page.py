@@ -11,8 +11,9 @@ import pytest
 from playwright.sync_api import expect
 
 from calibrations.importing.foreign import read_csv
+from drivers.recorder import Samples
 from procedures.session import Pose
-from rig.record import Block, KeptPose, Record
+from rig.record import KeptPose, Record
 from tests.browser.conftest import Workbench
 from tests.browser.measured import hidden, wandering
 
@@ -27,7 +28,7 @@ def runs(workbench: Workbench, tmp_path: Path) -> Iterator[list[str]]:
         made = [record.add_table(table) for table in tables]
         parts = {"bench": {"seed": 1}, "identities": {}, "configuration": "abc", "source": "a bench"}
         made.append(record.begin("noise-floor", {}, constants={"sensor": "ADXL203"}, kind="still", **parts))
-        block = Block(np.array([[2.0, 1.0], [4.0, 1.0]]), ("vx", "vy"), 1000.0, 0.0)
+        block = Samples(np.array([[2.0, 1.0], [4.0, 1.0]]), ("vx", "vy"), 1000.0, 0.0)
         record.keep(made[-1], 0, KeptPose(Pose(0, 0, 0, "still 0"), block, 1.0, 22.0), None)
         yield made
 

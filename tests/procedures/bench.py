@@ -13,12 +13,12 @@ import numpy as np
 from calibrations.table import Table
 from drivers.handheld.world import HandheldWorld
 from drivers.motor_stage import Turn
+from drivers.recorder import Samples
 from drivers.world.stage import Trajectory
 from drivers.world.world import World
-from procedures.instruments import Samples
 from procedures.questions import Mounting, Question
 from procedures.session import Dwell, Guidance, Limits, Pose, Reading, Session
-from rig.record.values import Block, KeptPose
+from rig.record.values import KeptPose
 
 CHANNELS = ("vx", "vy", "supply")
 RATE_HZ = 1000.0
@@ -77,7 +77,7 @@ class Adc:
         start_s, n = self.world.now_s, round(duration_s * RATE_HZ)
         volts = self.world.adc_volts(self.channels, start_s, 1 / RATE_HZ, n)
         step_v = self.world.config.converter.step_v
-        return Block(np.rint(volts / step_v) * step_v, self.channels, RATE_HZ, start_s)
+        return Samples(np.rint(volts / step_v) * step_v, self.channels, RATE_HZ, start_s)
 
     def acquire_watched(self, duration_s: float, watch: Callable[[], object], every_s: float) -> Samples:
         return self.acquire(duration_s)

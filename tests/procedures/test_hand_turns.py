@@ -12,14 +12,14 @@ import pytest
 from calibrations.geometry.turns import make_turns
 from calibrations.table import Table
 from drivers.handheld.hand import Hand
+from drivers.recorder import Samples
 from procedures.errors import NoAnswer, SettingError
 from procedures.hand_turns import TURN, hand_turns
-from procedures.instruments import Samples
 from procedures.session import Session
 from rig.instruments.by_hand import HandAnalysis
 from rig.record.measured import turns_table
 from rig.record.turns import is_turn, turn_columns
-from rig.record.values import Block, Run
+from rig.record.values import Run
 from tests.handling import SlowAdc, turn_errors, turn_world, turns_by_procedure
 from tests.procedures.bench import Book, session
 
@@ -121,7 +121,7 @@ class FaultyAdc(SlowAdc):
             yield self.spoil(window) if is_turning and turns == 3 else window
 
 
-def saturate(block: Block) -> Block:
+def saturate(block: Samples) -> Samples:
     volts = block.volts.copy()
     volts[:, 3:] = np.clip(volts[:, 3:], 2.4, 2.6)  # 17 deg/s each way
     return replace(block, volts=volts)

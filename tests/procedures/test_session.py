@@ -11,12 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.recorder import Samples
 from procedures.errors import Declined, SafetyLimit
-from procedures.instruments import Samples
 from procedures.questions import Question
 from procedures.session import Dwell, Limits, Pose, Reading, Session
 from procedures.sweep import grid
-from rig.record.values import Block
 
 POSES = st.builds(Pose, st.sampled_from([30.0, 90.0]), st.sampled_from([0.0, 10.0]), st.sampled_from([-1, 1]))
 
@@ -123,9 +122,9 @@ def test_a_pose_without_direction_is_approached_straight() -> None:
     assert beta.way == [0]
 
 
-def samples_at(reported_c: float | None) -> Block:
+def samples_at(reported_c: float | None) -> Samples:
     """A sample of a sensor that reports this temperature."""
-    return Block(np.zeros((1, 1)), ("ax",), 100.0, 0.0, reported_c)
+    return Samples(np.zeros((1, 1)), ("ax",), 100.0, 0.0, reported_c)
 
 
 @pytest.mark.parametrize("temperature", [9.9, 40.1, float("nan"), float("inf")])

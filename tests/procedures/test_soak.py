@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 from drivers.errors import LimitError
+from drivers.recorder import Samples
 from drivers.world.config import WorldConfig
 from drivers.world.world import World
 from procedures.errors import SafetyLimit, SettingError
-from procedures.instruments import Samples
 from procedures.session import Dwell, Limits
 from procedures.soak import POWER_ON, schedule, soak
 from tests.procedures.bench import Adc, Book, Oven, session

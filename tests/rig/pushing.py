@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from calibrations.table import Table
+from drivers.recorder import Samples
 from procedures.session import Pose, Reading
 from rig.errors import LabAway
 from rig.lab_url import lab_url
-from rig.record import Block, KeptPose, Record
+from rig.record import KeptPose, Record
 from rig.record.push import PushedRun, push, unsent
 
 POSES, SAMPLES = 12, 400
@@ -27,7 +28,7 @@ def a_run(record: Record, seed: int = 1, state: str = "complete", poses: int = P
     run = record.begin("sweep", {"step_deg": 0.1 + 0.2}, constants={"sensor": "ADXL203"}, **made)
     for number in range(poses):
         record.log(run, number / 3, "run", "kept", f"pose {number}")
-        samples = Block(draw.normal(2.5, 1e-3, (SAMPLES, 2)), CHANNELS, 1000.0, number / 7)
+        samples = Samples(draw.normal(2.5, 1e-3, (SAMPLES, 2)), CHANNELS, 1000.0, number / 7)
         kept = KeptPose(Pose(90, 10.0 * number / 3, 1, "A+ to B-"), samples, number / 3, 20 + number / 9)
         record.keep(run, number, kept, {"clock": number})
     record.keep_readings(run, [Reading("level-x", 1 / 3, "deg", None), Reading("bias-x", 2.5, "V", 1e-4)], None)

@@ -14,6 +14,7 @@ import pytest
 from rich.console import Console, RenderableType
 
 from calibrations.text import columns, duration, size
+from drivers.recorder import Samples
 from procedures.catalogue import find
 from procedures.errors import Declined, NoAnswer
 from procedures.questions import Choice, Confirm, Mounting, Number
@@ -27,7 +28,7 @@ from rig.errors import Stopped
 from rig.files import free_bytes
 from rig.planning.plan import Plan, plan
 from rig.planning.preparation import checks, mounting
-from rig.record import Block, KeptPose, Record
+from rig.record import KeptPose, Record
 from rig.runs.estimates import nearness
 from rig.runs.observer import Progress, RunView
 from rig.runs.runner import Outcome
@@ -39,7 +40,7 @@ SWEEP = find("sweep")
 
 
 def kept(number: int, noise: float = 0.1, path: str = "") -> KeptPose:
-    block = Block(np.array([[2.5 - noise, 2.5], [2.5 + noise, 2.5]]), ("vx", "vy"), 1000.0, 0.0)
+    block = Samples(np.array([[2.5 - noise, 2.5], [2.5 + noise, 2.5]]), ("vx", "vy"), 1000.0, 0.0)
     return KeptPose(Pose(90, 10.0 * number, 1, path), block, 3600.0, 28.3)
 
 

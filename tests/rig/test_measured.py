@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.recorder import Samples
 from drivers.world.gravity import Base, Package, felt_g, mounting, vertical
 from procedures.session import Pose
 from rig.record.measured import FORCE, positions_table, sensor_from_base, sensor_from_table, specific_force_g
-from rig.record.values import Block, KeptPose, Run
+from rig.record.values import KeptPose, Run
 
 ANGLES = st.floats(-360.0, 360.0)
 POSES = st.builds(Pose, ANGLES, ANGLES, mount_deg=ANGLES, flip=st.sampled_from([0, 1]), up=st.sampled_from("xyz"))
@@ -36,7 +37,7 @@ def test_the_force_in_a_turn_is_its_mean_over_the_turn(pose: Pose) -> None:
 
 
 def test_one_position_makes_a_table() -> None:
-    samples = Block(np.array([[0.1, 0.2, 1.0], [0.3, 0.2, 1.0]]), FORCE, 1000.0, 2.5)
+    samples = Samples(np.array([[0.1, 0.2, 1.0], [0.3, 0.2, 1.0]]), FORCE, 1000.0, 2.5)
     run = Run("a", "positions", "hand", "running", {}, {}, {}, "", {}, "", "", None, None, {}, 1)
     table = positions_table(run, [KeptPose(Pose(0.0, 0.0), samples, 3.5, None)])
     assert [table.column(name).tolist() for name in FORCE] == [pytest.approx([0.2]), [0.2], [1.0]]

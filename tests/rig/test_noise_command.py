@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from calibrations.noise.deviations import deviations
+from drivers.recorder import Samples
 from procedures.noise_floor import STILL
 from procedures.session import Pose
-from rig.record import Block, KeptPose, Record
+from rig.record import KeptPose, Record
 from rig.services.still import coarse, stream
 from tests import recorded
 from tests.rig.conftest import Ended
@@ -195,7 +196,7 @@ def test_no_block_of_a_run_is_read_twice(run: str) -> None:
 def test_a_supply_is_coarse_where_noise_does_not_smooth_its_steps(noise_v: float, told: bool) -> None:
     step = 0.3e-3
     volts = np.round((5.0 + noise_v * np.random.default_rng(1).standard_normal((10_000, 1))) / step + 0.4) * step
-    found = coarse(KeptPose(Pose(0, 0, 0, STILL), Block(volts, ("supply",), 1000.0, 0.0), 0.0, 22.0))
+    found = coarse(KeptPose(Pose(0, 0, 0, STILL), Samples(volts, ("supply",), 1000.0, 0.0), 0.0, 22.0))
     assert found == ({"supply_v": pytest.approx(step)} if told else {})
 
 

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from drivers.recorder import Samples
 from procedures.magnetometer_turn import full_turn
 from procedures.rate_turn import turns
 from procedures.session import Pose
-from rig.record import Block, KeptPose, Record
+from rig.record import KeptPose, Record
 from rig.record.measured import sensor_from_base, sensor_from_table, specific_force_g
 from rig.runs.estimates import RunningEstimates
 
@@ -23,7 +24,7 @@ def kept(poses: Iterator[Pose], outputs: Mapping[str, Any], seed: int = 1) -> li
     random, found = np.random.default_rng(seed), []
     for k, pose in enumerate(poses):
         volts = np.array([[of(pose) + NOISE_V * random.standard_normal() for of in outputs.values()]])
-        found.append(KeptPose(pose, Block(volts, tuple(outputs), 1.0, float(k)), float(k), None, number=k))
+        found.append(KeptPose(pose, Samples(volts, tuple(outputs), 1.0, float(k)), float(k), None, number=k))
     return found
 
 

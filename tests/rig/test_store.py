@@ -10,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from calibrations.table import Table
+from drivers.recorder import Samples
 from procedures.session import Pose, Reading
 from rig.errors import RecordError, UnknownRun
-from rig.record import Block, KeptPose, Record
+from rig.record import KeptPose, Record
 from rig.record.measured import table_of
 from rig.record.schema import SCHEMA
 
@@ -33,8 +34,8 @@ def begin(record: Record) -> str:
     return record.begin("sweep", {"step_deg": 10.0}, constants={"sensor": "ADXL203"}, **parts)
 
 
-def block(values: object) -> Block:
-    return Block(np.array(values, dtype=np.float64), ("vx", "vy"), 1000.0, 2.5)
+def block(values: object) -> Samples:
+    return Samples(np.array(values, dtype=np.float64), ("vx", "vy"), 1000.0, 2.5)
 
 
 @settings(max_examples=25)

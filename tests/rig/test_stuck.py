@@ -9,10 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from drivers.errors import SensorFault
+from drivers.recorder import Samples
 from drivers.transport.faults import Fault
 from procedures.session import Pose
 from rig.record import KeptPose, Record
-from rig.record.values import Block
 from rig.runs.runner import resume, start
 from rig.runs.stuck import StuckOutputs
 from tests.rig.enduring import bench_for
@@ -39,9 +39,9 @@ def noise(sigma: float, seed: int = 1, filtered: float = 0.0) -> Noise:
     return samples
 
 
-def dwell(values: NDArray[np.float64] | Sequence[float], number: int, channel: str = "ax") -> Block:
+def dwell(values: NDArray[np.float64] | Sequence[float], number: int, channel: str = "ax") -> Samples:
     """A record of one output. Successive ones begin 10 s after each other."""
-    return Block(np.asarray(values, dtype=float).reshape(-1, 1), (channel,), RATE_HZ, 10.0 * number)
+    return Samples(np.asarray(values, dtype=float).reshape(-1, 1), (channel,), RATE_HZ, 10.0 * number)
 
 
 def noisy(outputs: StuckOutputs, dwells: int, sigma: float = 5.0, offset: float = 0.0) -> int:
