@@ -43,18 +43,20 @@ class Instrument(Protocol):
     def self_test(self) -> list[Check]: ...
 
 
-class Alarm(Protocol):
-    """An alarm of a drive, its cause in words, and the remedy."""
+@dataclass(frozen=True)
+class Alarm:
+    """A drive's alarm, its cause in words, and the remedy. `resettable`: a command can reset it after the remedy."""
+
+    code: int
+    text: str
+    remedy: str
+    resettable: bool
 
     @property
-    def code(self) -> int: ...
-    @property
-    def text(self) -> str: ...
-    @property
-    def remedy(self) -> str: ...
-    @property
-    def resettable(self) -> bool:
-        """Whether a command can reset it once its cause is gone."""
+    def words(self) -> str:
+        """Instructions for a person: remove the cause, then reset the alarm."""
+        reset = "then reset the alarm with `rig check --reset`, or switch the drive off and on"
+        return f"{self.remedy}; {reset if self.resettable else 'the alarm needs a power cycle'}"
 
 
 @runtime_checkable

@@ -10,24 +10,7 @@ if TYPE_CHECKING:
     from drivers.motor_stage import Turn
     from drivers.recorder import Samples
 
-__all__ = [
-    "OUTPUTS",
-    "Adc",
-    "Clock",
-    "Level",
-    "Oven",
-    "Positioner",
-    "Read",
-    "Samples",
-    "Stage",
-    "Tilt",
-    "Turn",
-    "output_channel",
-]
-
 Read = TypeVar("Read")
-
-
 OUTPUTS = (("vx", "vy", "vz"), ("ax", "ay", "az"))  # of an analog accelerometer, and of a digital one
 
 

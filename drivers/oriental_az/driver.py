@@ -10,10 +10,10 @@ import math
 from collections.abc import Callable, Iterator
 
 from drivers.errors import Interlocked, NotSettled, StageAlarm, StageLost
-from drivers.instrument import Check, Identity
+from drivers.instrument import Alarm, Check, Identity
 from drivers.motor_stage import LEAD_S, MotorStage, Turn, move_s
 from drivers.oriental_az import registers as az
-from drivers.oriental_az.registers import Alarm, Settings
+from drivers.oriental_az.registers import Settings
 from drivers.transport import Address, Links
 from drivers.transport.modbus import Unit
 

@@ -26,7 +26,7 @@ import math
 from dataclasses import dataclass
 
 from drivers.errors import LimitError
-from drivers.instrument import require_positive
+from drivers.instrument import Alarm, require_positive
 from drivers.motor_stage import MotorSettings
 from drivers.transport.modbus import Register
 
@@ -73,27 +73,6 @@ MOTOR_TEMPERATURE = Register(0x00FA, "int32", "motor temperature", "C", 0.1)
 RESET_ALARM = Register(0x0180, "uint32", "alarm reset")
 RESETTABLE_BY_POWER_ONLY = frozenset({0x20, 0x28, 0x2A, 0x41, 0x42, 0x45, 0xF0})
 
-
-@dataclass(frozen=True)
-class Alarm:
-    """A drive's alarm in words, and the remedy."""
-
-    code: int
-    text: str
-    remedy: str
-
-    @property
-    def resettable(self) -> bool:
-        """Whether `reset_alarm` can clear it once its cause is gone."""
-        return self.code not in RESETTABLE_BY_POWER_ONLY
-
-    @property
-    def words(self) -> str:
-        """Instructions for a person: remove the cause, then reset the alarm."""
-        reset = "then reset the alarm with `rig check --reset`, or switch the drive off and on"
-        return f"{self.remedy}; {reset if self.resettable else 'the alarm needs a power cycle'}"
-
-
 COORDINATES_NOT_SET = 0x4A
 COMMUNICATION_TIMEOUT = 0x85
 SOFTWARE_OVERTRAVEL = 0x67
@@ -131,7 +110,8 @@ def alarm_of(code: int) -> Alarm | None:
     """The alarm of a code; None for 0."""
     if code == 0:
         return None
-    return Alarm(code, *_WORDS.get(code, ("an alarm unknown to this program", "Look it up in the manual")))
+    text, remedy = _WORDS.get(code, ("an alarm unknown to this program", "Look it up in the manual"))
+    return Alarm(code, text, remedy, code not in RESETTABLE_BY_POWER_ONLY)
 
 
 # Settings of a stage in a bench file; times and paths of its moves.

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from calibrations.table import Array
+from drivers.dpg2.driver import Reading as LevelReading
 from drivers.errors import LimitError
 from drivers.instrument import OUTSIDE_ANGLE, OUTSIDE_POSITION, OUTSIDE_TEMPERATURE, require_within
 from drivers.labjack_t7.driver import Settings as AdcSettings
@@ -204,24 +205,15 @@ class PlannedOven:
         self._on = on
 
 
-@dataclass(frozen=True)
-class PlannedTilt:
-    """The reading of a level on a horizontal table."""
-
-    x_deg: float = 0.0
-    y_deg: float = 0.0
-    std_deg: float = 0.0
-
-
 class PlannedLevel:
     """A planned level that reads 0."""
 
     def __init__(self, name: str, settings: Any, ledger: Ledger) -> None:  # noqa: ARG002
         self._name, self._ledger = name, ledger
 
-    def read(self) -> PlannedTilt:
+    def read(self) -> LevelReading:
         self._ledger.add(f"{self._name} is read", LEVEL_S)
-        return PlannedTilt()
+        return LevelReading(0.0, 0.0, 0.0, 1, 0.0)
 
 
 class PlannedPositioner:
