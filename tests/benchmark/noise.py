@@ -19,6 +19,7 @@ from scipy.fft import next_fast_len
 
 from calibrations.noise.analysis import Coefficient, analyse
 from calibrations.noise.record import Samples, reduce_record
+from tests.calibrations.noises import least_std
 
 SAMPLES = 43_200
 TRUTH = {"white-noise": 1.0, "flicker-noise": 0.5, "rate-random-walk": 0.02}
@@ -41,15 +42,6 @@ def half_integrated(white: Array) -> Array:
     response = np.concatenate([[1.0], np.cumprod((k - 0.5) / k)])
     size = next_fast_len(2 * n, real=True)
     return np.asarray(np.fft.irfft(np.fft.rfft(white, size) * np.fft.rfft(response, size), size)[n // 2 : n])
-
-
-def bound() -> dict[str, float]:
-    """Cramer-Rao bound on the standard deviation of each coefficient."""
-    sine = 2 * np.sin(np.pi * np.arange(1, SAMPLES) / (2 * SAMPLES))
-    columns = np.column_stack([np.ones(SAMPLES - 1), 1 / sine, 1 / sine**2])
-    values = np.array(list(TRUTH.values()))
-    scaled = 2 * values * columns / (columns @ values**2)[:, None]
-    return dict(zip(TRUTH, np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled / 2))).tolist(), strict=True))
 
 
 def ours(samples: Array) -> dict[str, Coefficient]:
@@ -76,10 +68,11 @@ def compared(seeds: int) -> dict[str, Any]:
         for name, true in TRUTH.items():
             std = found[name].std if found[name].identified else 0.0
             errors[name].append((found[name].value - true, std, peer[name] - true))
+    bound = least_std(TRUTH, SAMPLES)
     return {
         "median_ms": median(milliseconds),
         "false": false / seeds,
-        "coefficients": {name: _figures(np.array(errors[name]), bound()[name]) for name in TRUTH},
+        "coefficients": {name: _figures(np.array(errors[name]), bound[name]) for name in TRUTH},
     }
 
 

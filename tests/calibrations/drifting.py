@@ -58,15 +58,19 @@ def drifting(seed: int) -> Drifting:
     slow = flicker(random, len(t_s)) * random.choice([5e-6, 15e-6, 40e-6]) + 0.3e-3 * random.normal() * room(
         random, t_s
     )
-    volts, values = approach + slow, []
+    return Drifting(soak_values(random, t_s, approach + slow), 0.0)
+
+
+def soak_values(random: np.random.Generator, t_s: Array, volts: Array) -> tuple[Value, ...]:
+    """The values of a soak from the course of a bias: one of each tumble, and of the stretches of each hold."""
+    values = []
     for start, length in holds():
         values.append(seen(random, t_s, volts, start - MOVE_S - TUMBLE_S, TUMBLE_S, WHITE_V))
         count = max(3, int(np.ceil(length / STRETCH_S)))
-        for k in range(count):
-            part = length / count
-            std = BLOCK_V * np.sqrt(STEP_S / part)
-            values.append(seen(random, t_s, volts, start + k * part, part, std, held=True))
-    return Drifting(tuple(values), 0.0)
+        part = length / count
+        std = BLOCK_V * np.sqrt(STEP_S / part)
+        values += [seen(random, t_s, volts, start + k * part, part, std, held=True) for k in range(count)]
+    return tuple(values)
 
 
 def two_exponentials(random: np.random.Generator, t_s: Array) -> Array:

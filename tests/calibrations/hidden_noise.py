@@ -12,6 +12,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.calibrations.noises import flicker
+
 Array = NDArray[np.float64]
 Random = np.random.Generator
 SAMPLES, RATE_HZ = 20_000, 10.0
@@ -43,11 +45,8 @@ def relaxing(random: Random, n: int, time: float) -> Array:
 
 
 def fractional(random: Random, n: int = SAMPLES) -> Array:
-    """White noise integrated by half, with a past of three lengths (Kasdin, Proc. IEEE 83, 1995)."""
-    k = np.arange(1, 4 * n)
-    response = np.concatenate([[1.0], np.cumprod((k - 0.5) / k)])
-    spectrum = np.fft.rfft(random.standard_normal(4 * n), 8 * n) * np.fft.rfft(response, 8 * n)
-    return np.asarray(np.fft.irfft(spectrum, 8 * n)[3 * n : 4 * n])
+    """White noise integrated by half, with a past of three lengths."""
+    return flicker(random, n, 4)
 
 
 def telegraph(random: Random, n: int = SAMPLES, stay: float = 1000.0) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +18,12 @@ def random_walk(random: Random, n: int) -> Array:
     return np.cumsum(random.standard_normal(n))
 
 
-def flicker(random: Random, n: int) -> Array:
-    """1 / (2 pi f): white noise integrated by half, with a past of seven lengths (Kasdin, Proc. IEEE 83, 1995)."""
-    k = np.arange(1, PAST * n)
+def flicker(random: Random, n: int, past: int = PAST) -> Array:
+    """1 / (2 pi f): white noise integrated by half, the last of `past` lengths (Kasdin, Proc. IEEE 83, 1995)."""
+    k = np.arange(1, past * n)
     response = np.concatenate([[1.0], np.cumprod((k - 0.5) / k)])
-    white = np.fft.rfft(random.standard_normal(PAST * n), 2 * PAST * n)
-    return np.fft.irfft(white * np.fft.rfft(response, 2 * PAST * n), 2 * PAST * n)[(PAST - 1) * n : PAST * n]
+    white = np.fft.rfft(random.standard_normal(past * n), 2 * past * n)
+    return np.fft.irfft(white * np.fft.rfft(response, 2 * past * n), 2 * past * n)[(past - 1) * n : past * n]
 
 
 def quantisation(random: Random, n: int) -> Array:
@@ -44,3 +45,13 @@ def gauss_markov(random: Random, n: int, time_constant: float) -> Array:
 def sinusoid(n: int, frequency: float, phase: float = 1.0) -> Array:
     """Of unit amplitude, cycles per sample."""
     return np.sin(2 * np.pi * frequency * np.arange(n) + phase)
+
+
+def least_std(truth: Mapping[str, float], n: int) -> dict[str, float]:
+    """The Cramer-Rao bound of all coefficients of a mixture of n samples, from their spectra at every frequency."""
+    sine = 2 * np.sin(np.pi * np.arange(1, n) / (2 * n))
+    powers = {"white-noise": 0, "flicker-noise": -1, "rate-random-walk": -2, "quantisation-noise": 2}
+    columns = np.column_stack([sine ** powers[name] for name in truth])
+    values = np.array(list(truth.values()))
+    scaled = 2 * values * columns / (columns @ values**2)[:, None]
+    return dict(zip(truth, np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled / 2))).tolist(), strict=True))

@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.calibrations.hidden_noise import lagged
+
 Array = NDArray[np.float64]
 RATE_HZ = 1.0
 SAMPLES = 14_400  # 4 h
@@ -22,11 +24,7 @@ def oven(cycles: float = 1.5) -> Array:
 
 def follower(board_c: Array, delay_s: float) -> Array:
     """The temperature of a mass on the board."""
-    out, now = np.empty(len(board_c)), float(board_c[0])
-    for k, outside in enumerate(board_c):
-        now += (outside - now) / (delay_s * RATE_HZ)
-        out[k] = now
-    return out
+    return lagged(board_c, delay_s * RATE_HZ)
 
 
 def slipping(die_c: Array, grip_c: float) -> Array:

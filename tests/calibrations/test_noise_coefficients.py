@@ -58,21 +58,11 @@ def found(number: int) -> list[Known]:
     return [identified(analysed(record(MIXTURES[number], seed))) for seed in range(SEEDS)]
 
 
-def least_std(truth: Mapping[str, float]) -> dict[str, float]:
-    """The Cramer-Rao bound of all of a mixture's coefficients, from their spectra at every frequency."""
-    sine = 2 * np.sin(np.pi * np.arange(1, N) / (2 * N))
-    shapes = {WHITE: sine**0, FLICKER: 1 / sine, WALK: sine**-2, QUANTUM: sine**2}
-    columns = np.column_stack([shapes[name] for name in truth])
-    values = np.array(list(truth.values()))
-    scaled = 2 * values * columns / (columns @ values**2)[:, None]
-    return dict(zip(truth, np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled / 2))), strict=True))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(len(MIXTURES)))
 def test_errors_are_near_the_bound_and_intervals_hold(number: int) -> None:
     """Where the right processes were named: how often they are is another test."""
-    truth, bound = MIXTURES[number], least_std(MIXTURES[number])
+    truth, bound = MIXTURES[number], noises.least_std(MIXTURES[number], N)
     right = [each for each in found(number) if each.keys() == truth.keys()]
     assert len(right) >= 0.95 * SEEDS
     for name, true in truth.items():

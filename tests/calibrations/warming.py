@@ -15,15 +15,9 @@ import numpy as np
 
 from calibrations.table import Array
 from tests.calibrations.drifting import (
-    BLOCK_V,
-    MOVE_S,
     STEP_S,
-    STRETCH_S,
-    TUMBLE_S,
-    WHITE_V,
     Drifting,
-    holds,
-    seen,
+    soak_values,
 )
 
 DAY_S, HOUR_S = 86400.0, 3600.0
@@ -59,14 +53,7 @@ def warming(seed: int) -> Drifting:
     chip_k = chip(sensor, house_k)
     final = sensor.per_k * (sensor.rise_k + mean_k)
     volts = sensor.per_k * chip_k + sensor.flicker_v * traps(random, len(t_s))
-    values = []
-    for start, length in holds():
-        values.append(seen(random, t_s, volts, start - MOVE_S - TUMBLE_S, TUMBLE_S, WHITE_V))
-        count = max(3, int(np.ceil(length / STRETCH_S)))
-        part = length / count
-        std = BLOCK_V * np.sqrt(STEP_S / part)
-        values += [seen(random, t_s, volts, start + k * part, part, std, held=True) for k in range(count)]
-    return Drifting(tuple(values), final)
+    return Drifting(soak_values(random, t_s, volts), final)
 
 
 def house(random: np.random.Generator) -> tuple[Array, float]:

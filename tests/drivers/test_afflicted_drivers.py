@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from dataclasses import replace
-from importlib import import_module
 from typing import Any
 
 import pytest
 
 from drivers.clock import SimulatedClock
 from drivers.errors import DriverError, LinkTimeout, NotSettled, Refused, StageAlarm, StreamError
-from drivers.transport import Links
 from drivers.transport.faults import EFFECTS, Fault, faults_of
+from tests.drivers.conftest import connected
 
 DRIVERS = ["oriental_az", "labjack_t7", "omega_cn7500", "dpg2", "pi_e727"]
 LONGEST_S = 60.0  # simulated, for an identification and a self-test
@@ -21,22 +21,14 @@ LONGEST_S = 60.0  # simulated, for an identification and a self-test
 @pytest.fixture
 def afflicted(small_world: Any) -> Iterator[Callable[..., tuple[Any, SimulatedClock]]]:
     """A driver on its twin, which has a fault as soon as it is connected."""
-    opened: list[Any] = []
+    with ExitStack() as opened:
 
-    def make(name: str, fault: Fault, **more: float) -> tuple[Any, SimulatedClock]:
-        driver, twin = import_module(f"drivers.{name}.driver"), import_module(f"drivers.{name}.twin")
-        settings = driver.Settings() if name != "labjack_t7" else driver.Settings(channels={"supply": 0}, **more)
-        server, clock = twin.serve(small_world, {"alpha": (1, settings)}, twin.LISTEN), SimulatedClock()
-        clock.attach(server)
-        links = Links(clock)
-        opened.extend([links, server])
-        instrument = driver.connect(server.addresses["alpha"], links, settings, "alpha")
-        server.afflict("alpha", faults_of(name, [fault]))
-        return instrument, clock
+        def make(name: str, fault: Fault, **settings: float) -> tuple[Any, SimulatedClock]:
+            instrument, server, clock = opened.enter_context(connected(name, small_world, **settings))
+            server.afflict("alpha", faults_of(name, [fault]))
+            return instrument, clock
 
-    yield make
-    for one in opened:
-        one.close()
+        yield make
 
 
 @pytest.mark.parametrize("name", ["oriental_az", "labjack_t7", "omega_cn7500"])

@@ -14,9 +14,8 @@ import pytest
 from numpy.typing import NDArray
 
 from drivers import clock as clock_module
-from drivers.clock import SimulatedClock
 from drivers.instrument import Check, Identity
-from drivers.transport import Links
+from tests.drivers.conftest import connected
 
 NAMES = sorted(file.parent.name for file in Path(clock_module.__file__).parent.glob("*/driver.py"))
 SERIAL = [name for name in NAMES if import_module(f"drivers.{name}.twin").LISTEN.startswith("pty")]
@@ -42,17 +41,10 @@ class Steady:
 @pytest.fixture(params=WIRES, ids=lambda wire: f"{wire[0]}-{wire[1] or 'usual'}")
 def instrument(request: pytest.FixtureRequest, small_world: Any) -> Iterator[Any]:
     name, listen = request.param
-    driver, twin = import_module(f"drivers.{name}.driver"), import_module(f"drivers.{name}.twin")
-    settings = driver.Settings() if name != "labjack_t7" else driver.Settings(channels={"supply": 0})
     if name in ("imu_lines", "mavlink_imu", "xsens_mti", "epics_adc"):
         small_world = Steady()
-    server = twin.serve(small_world, {"alpha": (1, settings)}, listen or twin.LISTEN)
-    clock = SimulatedClock()
-    clock.attach(server)
-    links = Links(clock)
-    yield driver.connect(server.addresses["alpha"], links, settings, "alpha")
-    links.close()
-    server.close()
+    with connected(name, small_world, listen) as (driver, _, _):
+        yield driver
 
 
 def test_there_are_the_three_of_the_bench() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -43,18 +43,25 @@ SHORT = {  # settings that make a procedure short
 
 
 @pytest.fixture
-def digital(tmp_path: Path) -> Callable[..., str]:
-    """The bench file of the simulated rig with a sensor that sends lines in a unit."""
+def sensor_bench(tmp_path: Path) -> Callable[..., str]:
+    """The bench file of the simulated rig with a digital sensor; `faults` are those of the sensor."""
 
-    def write(unit: str) -> str:
+    def write(driver: str, settings: Mapping[str, Any], *faults: dict[str, Any]) -> str:
         document = yaml.safe_load(DEFAULT.read_text(encoding="utf-8"))
-        settings = {"columns": COLUMNS, "unit": unit, "gyro_unit": "rad/s", "field_unit": "gauss", "rate_hz": 100}
-        document["instruments"]["adc"] = {"driver": "imu_lines", "url": "simulated", "settings": settings}
-        path = tmp_path / "digital.yaml"
+        adc = {"driver": driver, "url": "simulated", "settings": settings, "faults": list(faults)}
+        document["instruments"]["adc"] = adc
+        path = tmp_path / f"{driver}.yaml"
         path.write_text(yaml.safe_dump(document), encoding="utf-8")
         return str(path)
 
     return write
+
+
+@pytest.fixture
+def digital(sensor_bench: Callable[..., str]) -> Callable[..., str]:
+    """The bench file with a sensor that sends lines in a unit."""
+    settings = {"columns": COLUMNS, "gyro_unit": "rad/s", "field_unit": "gauss", "rate_hz": 100}
+    return lambda unit: sensor_bench("imu_lines", settings | {"unit": unit})
 
 
 FRAMED = {  # drivers of sensors that send frames: the units of a table and of a magnetometer
@@ -66,22 +73,9 @@ PAGE = Path(__file__).parents[2] / "docs/how-to/digital.md"
 
 
 @pytest.fixture
-def framed(tmp_path: Path) -> Callable[..., str]:
-    """The bench file of the simulated rig with a sensor that sends frames; `faults` are those of the sensor."""
-
-    def write(driver: str, *faults: dict[str, Any]) -> str:
-        document = yaml.safe_load(DEFAULT.read_text(encoding="utf-8"))
-        adc = {
-            "driver": driver,
-            "url": "simulated",
-            "settings": {"rate_hz": 100, "most_lost": 0.05},
-        }
-        document["instruments"]["adc"] = adc | {"faults": list(faults)}
-        path = tmp_path / f"{driver}.yaml"
-        path.write_text(yaml.safe_dump(document), encoding="utf-8")
-        return str(path)
-
-    return write
+def framed(sensor_bench: Callable[..., str]) -> Callable[..., str]:
+    """The bench file with a sensor that sends frames."""
+    return lambda driver, *faults: sensor_bench(driver, {"rate_hz": 100, "most_lost": 0.05}, *faults)
 
 
 def unit_expected(name: str, unit: str) -> set[str]:
