@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -97,20 +96,6 @@ class SmallWorld:
         self.carriages = {axis: np.array(pieces) for axis, pieces in state["carriages"].items()}
         self.oven = (state["oven"][0], state["oven"][1])
         self._random.bit_generator.state = state["random"]
-
-
-@contextmanager
-def connected(name: str, world: Any, listen: str = "", **settings: Any) -> Iterator[tuple[Any, Server, SimulatedClock]]:
-    """A driver `alpha` on its simulated instrument, the server of the instrument, and the clock."""
-    driver, twin = import_module(f"drivers.{name}.driver"), import_module(f"drivers.{name}.twin")
-    wired = {"channels": {"supply": 0}} if name == "labjack_t7" else {}
-    parsed, clock = driver.Settings(**wired, **settings), SimulatedClock()
-    server = twin.serve(world, {"alpha": (1, parsed)}, listen or twin.LISTEN)
-    clock.attach(server)
-    links = Links(clock)
-    yield driver.connect(server.addresses["alpha"], links, parsed, "alpha"), server, clock
-    links.close()
-    server.close()
 
 
 @contextmanager

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from typing import Any
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from drivers.clock import SimulatedClock
 from drivers.transport import Links
 from drivers.transport.faults import Fault, faults_of
+from drivers.transport.server import Server
 
 FORCE_G = {"ax": 0.1, "ay": -0.2, "az": 1.0}
 RATE_DEG_S = {"gx": 3.0, "gy": -40.0, "gz": 15.0}
@@ -33,26 +35,50 @@ class Ramp:
         return np.column_stack([LEVEL[name] + 1e-3 * t_s for name in outputs])
 
 
+@contextmanager
+def connected(
+    name: str,
+    world: Any,
+    settings: Any,
+    role: str = "alpha",
+    *,
+    listen: str = "",
+    sends: Any = None,
+    faults: Sequence[Fault] = (),
+) -> Iterator[tuple[Any, Server, SimulatedClock]]:
+    """A driver on its simulated instrument, the server of the instrument, and the clock.
+
+    `sends`: other settings of the simulated instrument. `faults` are there before the driver connects.
+    """
+    driver, twin = import_module(f"drivers.{name}.driver"), import_module(f"drivers.{name}.twin")
+    server, clock = twin.serve(world, {role: (1, sends or settings)}, listen or twin.LISTEN), SimulatedClock()
+    if faults:
+        server.afflict(role, faults_of(name, faults))
+    clock.attach(server)
+    links = Links(clock)
+    yield driver.connect(server.addresses[role], links, settings, role), server, clock
+    links.close()
+    server.close()
+
+
+def usual_settings(name: str, **settings: Any) -> Any:
+    """The default settings of a driver; a T7 has one input, which the small world has too."""
+    wired = {"channels": {"supply": 0}} if name == "labjack_t7" else {}
+    return import_module(f"drivers.{name}.driver").Settings(**wired, **settings)
+
+
 class DigitalSensors:
     """Digital sensors, each with its driver and a simulated clock."""
 
     def __init__(self) -> None:
-        self._opened: list[Any] = []
+        self._opened = ExitStack()
 
     def connect(
         self, driver: str, settings: Any, *faults: Fault, listen: str = "", world: Any = None, sends: Any = None
     ) -> Any:
         """The driver with `settings` on its twin. `sends`: other settings of the twin; `listen`: its address."""
-        twin, module = import_module(f"drivers.{driver}.twin"), import_module(f"drivers.{driver}.driver")
-        server = twin.serve(world or Ramp(), {"adc": (1, sends or settings)}, listen or twin.LISTEN)
-        if faults:
-            server.afflict("adc", faults_of(driver, faults))
-        clock = SimulatedClock()
-        clock.attach(server)
-        links = Links(clock)
-        self._opened += [links, server]
-        return module.connect(server.addresses["adc"], links, settings, "adc")
+        made = connected(driver, world or Ramp(), settings, "adc", listen=listen, sends=sends, faults=faults)
+        return self._opened.enter_context(made)[0]
 
     def close(self) -> None:
-        for opened in self._opened:
-            opened.close()
+        self._opened.close()

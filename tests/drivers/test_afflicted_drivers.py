@@ -12,7 +12,7 @@ import pytest
 from drivers.clock import SimulatedClock
 from drivers.errors import DriverError, LinkTimeout, NotSettled, Refused, StageAlarm, StreamError
 from drivers.transport.faults import EFFECTS, Fault, faults_of
-from tests.drivers.conftest import connected
+from tests.drivers.digital import connected, usual_settings
 
 DRIVERS = ["oriental_az", "labjack_t7", "omega_cn7500", "dpg2", "pi_e727"]
 LONGEST_S = 60.0  # simulated, for an identification and a self-test
@@ -24,7 +24,9 @@ def afflicted(small_world: Any) -> Iterator[Callable[..., tuple[Any, SimulatedCl
     with ExitStack() as opened:
 
         def make(name: str, fault: Fault, **settings: float) -> tuple[Any, SimulatedClock]:
-            instrument, server, clock = opened.enter_context(connected(name, small_world, **settings))
+            instrument, server, clock = opened.enter_context(
+                connected(name, small_world, usual_settings(name, **settings))
+            )
             server.afflict("alpha", faults_of(name, [fault]))
             return instrument, clock
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from drivers import clock as clock_module
 from drivers.instrument import Check, Identity
-from tests.drivers.conftest import connected
+from tests.drivers.digital import connected, usual_settings
 
 NAMES = sorted(file.parent.name for file in Path(clock_module.__file__).parent.glob("*/driver.py"))
 SERIAL = [name for name in NAMES if import_module(f"drivers.{name}.twin").LISTEN.startswith("pty")]
@@ -43,7 +43,7 @@ def instrument(request: pytest.FixtureRequest, small_world: Any) -> Iterator[Any
     name, listen = request.param
     if name in ("imu_lines", "mavlink_imu", "xsens_mti", "epics_adc"):
         small_world = Steady()
-    with connected(name, small_world, listen) as (driver, _, _):
+    with connected(name, small_world, usual_settings(name), listen=listen) as (driver, _, _):
         yield driver
 
 

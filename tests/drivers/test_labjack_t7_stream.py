@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import struct
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing
 from itertools import pairwise
 from typing import Any
 
@@ -19,13 +19,12 @@ from drivers.errors import LimitError, LinkTimeout, StreamError
 from drivers.labjack_t7 import driver as labjack_t7
 from drivers.labjack_t7 import registers as t7
 from drivers.labjack_t7 import stream as labjack_t7_reception
-from drivers.labjack_t7 import twin as labjack_t7_twin
 from drivers.labjack_t7.stream import Packets, Reception
-from drivers.transport import Links
 from drivers.transport.link import Link, open_link
 from drivers.transport.server import Port, Server, Twin
 from drivers.world.config import WorldConfig
 from drivers.world.world import World
+from tests.drivers.digital import connected
 
 FOUR = labjack_t7.Settings(channels={"vx": 0, "vy": 1, "supply": 2, "thermistor": 3})
 
@@ -33,18 +32,13 @@ FOUR = labjack_t7.Settings(channels={"vx": 0, "vy": 1, "supply": 2, "thermistor"
 @pytest.fixture
 def converter() -> Iterator[Callable[..., tuple[World, labjack_t7.T7]]]:
     """Makes a converter in front of a whole simulated rig, always of the same seed."""
-    opened: list[Any] = []
+    with ExitStack() as opened:
 
-    def make(settings: labjack_t7.Settings = FOUR) -> tuple[World, labjack_t7.T7]:
-        clock, world = SimulatedClock(), World(WorldConfig.adxl203(), seed=4)
-        server, links = labjack_t7_twin.serve(world, {"adc": (1, settings)}), Links(clock)
-        clock.attach(server)
-        opened.extend([links, server])
-        return world, labjack_t7.connect(server.addresses["adc"], links, settings, "adc")
+        def make(settings: labjack_t7.Settings = FOUR) -> tuple[World, labjack_t7.T7]:
+            world = World(WorldConfig.adxl203(), seed=4)
+            return world, opened.enter_context(connected("labjack_t7", world, settings, "adc"))[0]
 
-    yield make
-    for one in opened:
-        one.close()
+        yield make
 
 
 @pytest.mark.parametrize("block_s", [0.1, 1.7, 60.0])

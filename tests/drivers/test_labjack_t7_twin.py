@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
@@ -19,6 +20,7 @@ from drivers.labjack_t7.driver import Settings
 from drivers.transport import Links
 from drivers.transport.faults import Fault, faults_of
 from tests.drivers.conftest import bytes_exchanged
+from tests.drivers.digital import connected
 
 STEP_V = 3.2e-4  # one code in the range of 10 V
 
@@ -163,20 +165,14 @@ GUARDED = Settings(channels={"supply": 5}, power_dio=3, interlocks={"e-stop": 4,
 @pytest.fixture
 def guarded(small_world: Any) -> Iterator[Callable[..., labjack_t7.T7]]:
     """A converter with interlocks, which has faults."""
-    opened: list[Any] = []
+    with ExitStack() as opened:
 
-    def make(*faults: Fault) -> labjack_t7.T7:
-        clock = SimulatedClock()
-        server, links = labjack_t7_twin.serve(small_world, {"adc": (1, GUARDED)}), Links(clock)
-        clock.attach(server)
-        opened.extend([links, server])
-        converter = labjack_t7.connect(server.addresses["adc"], links, GUARDED, "adc")
-        server.afflict("adc", faults_of("labjack_t7", faults))
-        return converter
+        def make(*faults: Fault) -> labjack_t7.T7:
+            converter, server, _ = opened.enter_context(connected("labjack_t7", small_world, GUARDED, "adc"))
+            server.afflict("adc", faults_of("labjack_t7", faults))
+            return converter
 
-    yield make
-    for one in opened:
-        one.close()
+        yield make
 
 
 def test_interlocks_are_closed_whatever_else_is_switched(guarded: Callable[..., labjack_t7.T7]) -> None:

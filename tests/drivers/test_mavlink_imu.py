@@ -86,7 +86,7 @@ def test_the_self_test_shows_messages_rate_time_and_temperature(connect: Connect
         (None, {"rate_hz": 5000.0}, Refused, "at 5000 Hz: denied"),
         (None, {"outputs": ("ax", "az"), "sends": mavlink_imu.Settings(outputs=("ax",))}, SensorFault, "sends no az"),
         (None, {"imu": 1, "sends": mavlink_imu.Settings()}, LinkTimeout, "received no HIGHRES_IMU"),
-        (None, {"sends": mavlink_imu.Settings("SCALED_IMU")}, Refused, "unsupported"),
+        (None, {"sends": mavlink_imu.Settings(message="SCALED_IMU")}, Refused, "unsupported"),
     ],
 )
 def test_faults_of_a_mavlink_sensor_are_named(

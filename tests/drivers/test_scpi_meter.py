@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,11 @@ import pytest
 
 from drivers.clock import SimulatedClock, WallClock
 from drivers.errors import BadFrame, DriverError, LimitError, LinkRefused, LinkTimeout, OverRange, Refused, StreamError
-from drivers.scpi_meter import driver, twin
+from drivers.scpi_meter import driver
 from drivers.transport import Address, Links
 from drivers.transport.address import Url
 from drivers.transport.faults import Fault, faults_of
+from tests.drivers.digital import connected
 from tests.fuzz.labs import SCPI, scpi_answers
 
 CHANNELS = {"supply": 102, "time": 101}
@@ -46,22 +48,16 @@ Make = Callable[..., driver.Meter]
 @pytest.fixture
 def make(small_world: Any) -> Iterator[Make]:
     """A driver on its twin in the small world; `fault` begins once it is connected."""
-    opened: list[Any] = []
+    with ExitStack() as opened:
 
-    def made(fault: Fault | None = None, **settings: Any) -> driver.Meter:
-        chosen = driver.Settings(**{"channels": CHANNELS, "rate_hz": 20.0, "timeout_s": 1.0} | settings)
-        server, clock = twin.serve(small_world, {"adc": (1, chosen)}), SimulatedClock()
-        clock.attach(server)
-        links = Links(clock)
-        opened.extend([links, server])
-        meter = driver.connect(server.addresses["adc"], links, chosen, "adc")
-        if fault:
-            server.afflict("adc", faults_of("scpi_meter", [fault]))
-        return meter
+        def made(fault: Fault | None = None, **settings: Any) -> driver.Meter:
+            chosen = driver.Settings(**{"channels": CHANNELS, "rate_hz": 20.0, "timeout_s": 1.0} | settings)
+            meter, server, _ = opened.enter_context(connected("scpi_meter", small_world, chosen, "adc"))
+            if fault:
+                server.afflict("adc", faults_of("scpi_meter", [fault]))
+            return meter
 
-    yield made
-    for each in opened:
-        each.close()
+        yield made
 
 
 @pytest.mark.parametrize("timer", [True, False])
@@ -159,7 +155,7 @@ def test_settings_that_cannot_be_are_refused(settings: dict[str, Any], told: str
 def visa(tmp_path: Path) -> Iterator[Callable[..., driver.Meter]]:
     """A meter of pyvisa-sim that answers READ? with `reading`."""
     pytest.importorskip("pyvisa_sim")
-    links = Links(WallClock())
+    links = Links(SimulatedClock())
 
     def made(reading: str = "+1.25E+00") -> driver.Meter:
         file = tmp_path / "meter.yaml"
