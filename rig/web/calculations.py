@@ -11,7 +11,7 @@ from concurrent.futures import Future
 from contextvars import copy_context
 from dataclasses import dataclass
 from functools import partial
-from threading import Thread
+from threading import Event, Thread
 from typing import Any, Generic, ParamSpec, TypeVar
 from weakref import WeakSet
 
@@ -86,21 +86,23 @@ class Calculation(Generic[R]):
 
     thread: Thread
     future: Future[R]
+    is_cancelled: Event
 
     def cancel(self) -> None:
         """Raise Cancelled in the thread at its next line of Python."""
         if not self.future.done() and (number := self.thread.ident) is not None:
+            self.is_cancelled.set()
             ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(number), ctypes.py_object(Cancelled))
 
 
 def begin(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> Calculation[R]:
     """Call in a thread. The server does not wait for the thread when it ends."""
-    future = Future[R]()
+    future, is_cancelled = Future[R](), Event()
     work = partial(copy_context().run, call, *args, **kwargs)
-    thread = Thread(target=_settle, args=(future, work), name=call.__name__, daemon=True)
+    thread = Thread(target=_settle, args=(future, work, is_cancelled), name=call.__name__, daemon=True)
     _CALCULATIONS.add(thread)
     thread.start()
-    return Calculation(thread, future)
+    return Calculation(thread, future, is_cancelled)
 
 
 async def off_loop(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
@@ -127,14 +129,17 @@ def leave_calculations() -> None:
         os._exit(0)
 
 
-def _settle(future: Future[R], work: Callable[[], R]) -> None:
-    """Set the result or the error of the work, even if no page waits for it."""
+def _settle(future: Future[R], work: Callable[[], R], is_cancelled: Event) -> None:
+    """Set the result or the error of the work, even if no page waits for it.
+
+    Compiled code makes a SystemError of a cancellation that comes while it is called.
+    """
     try:
         if future.set_running_or_notify_cancel():
             try:
                 result = work()
             except BaseException as error:
-                future.set_exception(error)
+                future.set_exception(Cancelled() if is_cancelled.is_set() else error)
             else:
                 future.set_result(result)
     except Cancelled as cancellation:  # it came after the end of the work

@@ -19,10 +19,11 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from rig.errors import RigError
 from rig.runs.signals import signal_handlers
-from rig.web.calculations import leave_calculations
+from rig.web.calculations import begin, leave_calculations
 from rig.web.desk import Desk
 from rig.web.frame import TITLE
 from rig.web.guard import TOKEN, Guard, names
+from rig.web.load_ahead import load_ahead
 from rig.web.pages import register
 
 LOST = {  # the message of a page whose server does not answer
@@ -71,6 +72,11 @@ def serve(desk: Desk, host: str, port: int | None, token: str, ready: Callable[[
         reconnect_timeout=RETURN_S,
         gzip_middleware_factory=None,
     )
+
+    def started() -> None:
+        ready(place)
+        begin(load_ahead)
+
     guarded = Guard(LeftPages(app), place.token, names(host, place.port))
     config = uvicorn.Config(
         guarded, log_level="warning", access_log=False, timeout_graceful_shutdown=0, ws_max_size=1 << 24
@@ -78,7 +84,7 @@ def serve(desk: Desk, host: str, port: int | None, token: str, ready: Callable[[
     logging.getLogger("uvicorn.error").addFilter(lambda entry: "graceful shutdown" not in entry.getMessage())
     ignored = signal_handlers(lambda *_: None, signal.SIGINT, signal.SIGTERM)  # uvicorn raises them again after its end
     with ignored, listener, closing(desk):
-        _Server(config, lambda: ready(place)).run(sockets=[listener])
+        _Server(config, started).run(sockets=[listener])
     atexit.register(leave_calculations)
 
 

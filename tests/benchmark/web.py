@@ -1,6 +1,10 @@
 """`python -m tests.benchmark.web`: the figures of the workbench in a real browser, one JSON document with targets.
 
 first page   from the server's address to the page that a newcomer reads; Chromium has been started before
+pictures     from the address of a sweep of the default rig, 518 poses, to its pictures, on a new server
+verdict      from the same address to the first verdict, which is provisional
+again        from the same address to the final verdict, the search being known
+report       from the address of the run to its report, the search being known
 add          from the click on Add to the second bar of the falling error and the new residual, on 518 poses
 night        from the address of a 12-hour soak (43.2 million samples of one channel) to its curve
 alive        from a key to its answer, the longest of some while effects are tried on 1,000 poses, and on 100,000 rows
@@ -27,14 +31,31 @@ import numpy as np
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from drivers.recorder import Samples
+from procedures.catalogue import find
 from procedures.session import Pose
+from rig.bench import read_bench
+from rig.cli.terminal.watch import Quiet
 from rig.record import KeptPose, Record
+from rig.runs.runner import start
 from tests.browser.measured import hidden, hundred_thousand, thousand
 from tests.browser.test_run_page import begin
 
-TARGETS = {"first_page_s": 1.0, "add_s": 1.5, "night_s": 1.0, "alive_s": 0.5, "memory_growth_mb": 16.0}
+TARGETS = {
+    "first_page_s": 1.0,
+    "pictures_s": 1.0,
+    "verdict_s": 2.0,
+    "again_s": 2.0,
+    "report_s": 3.0,
+    "add_s": 1.5,
+    "night_s": 1.0,
+    "alive_s": 0.5,
+    "memory_growth_mb": 16.0,
+}
 BLOCKS, IN_A_BLOCK, RATE_HZ = 4320, 10_000, 1000.0
 STEP_V = 20.0 / 65536
+DOTS = "[aria-label='Residuals'] .points path"
+VERDICT = ".verdict.bad, .verdict.doubt, .verdict.good"
+CARD = ".side .card"
 BARS = "[aria-label*=' by model'] .bars .point"
 CURVE = "[aria-label='the run over time'] .scatterlayer path"
 REPEATS = 3
@@ -51,6 +72,8 @@ def main() -> None:
         )
         browser.new_page().goto("about:blank")
         figures = {"first_page_s": min(_first_page(browser) for _ in range(REPEATS))}
+        with _served() as (url, _):
+            figures |= _sweep(browser.new_page(), url)
         with _served() as (url, server):
             page, origin = browser.new_page(), url.partition("/?")[0]
             page.set_default_timeout(PATIENCE_MS)
@@ -85,6 +108,25 @@ def _first_page(browser: Browser) -> float:
         took = _timed(page, url, "text=There are no measurements yet")
         page.close()
     return took
+
+
+def _sweep(page: Page, url: str) -> dict[str, float]:
+    """The pages on a sweep: first pictures, first verdict, verdict of the page that is opened again, report."""
+    with Record() as record:
+        run = start(record, read_bench(), find("sweep"), {}, Quiet({})).run.run
+    page.set_default_timeout(PATIENCE_MS)
+    page.goto(url)
+    page.goto("about:blank")
+    origin = url.partition("/?")[0]
+    model = f"{origin}/?data={run}"
+    began = time.perf_counter()
+    figures = {"pictures_s": _timed(page, model, DOTS)}
+    page.locator(VERDICT).wait_for()
+    figures["verdict_s"] = time.perf_counter() - began
+    page.locator(CARD).first.wait_for()
+    figures["again_s"] = _timed(page, model, CARD)
+    figures["report_s"] = _timed(page, f"{origin}/record/{run}", ".report iframe")
+    return figures
 
 
 def _add(page: Page, origin: str, data: str) -> float:

@@ -174,6 +174,24 @@ def test_a_cancelled_calculation_ends_at_its_next_line() -> None:
     calculation.cancel()  # after the end: nothing happens
 
 
+def test_what_a_cancellation_becomes_in_compiled_code_is_no_fault() -> None:
+    begun = threading.Event()
+
+    def endless() -> None:
+        begun.set()
+        try:
+            while True:
+                pass
+        except Cancelled as cancellation:
+            raise SystemError from cancellation
+
+    calculation = begin(endless)
+    assert begun.wait(60)
+    calculation.cancel()
+    with pytest.raises(Cancelled):
+        calculation.future.result(60)
+
+
 def test_nothing_follows_a_calculation_whose_page_was_closed() -> None:
     """Not even an error: the server's log would call it a fault of the program."""
     go, ended, said = threading.Event(), asyncio.Event(), list[str]()
