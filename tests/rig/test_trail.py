@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from html import escape
 from pathlib import Path
 from threading import Event, Thread
@@ -11,6 +12,7 @@ import pytest
 
 from calibrations.errors import ExpressionError, ModelError
 from calibrations.importing.foreign import write_csv
+from calibrations.model.file import dump_model
 from calibrations.presentation.charts.discovery import levels
 from calibrations.presentation.report.report import next_words
 from calibrations.progress import show_progress
@@ -18,7 +20,7 @@ from rig.services.report import make_report, next_of
 from rig.services.request import Request
 from rig.services.session import ModelSession, model_session
 from rig.web.calculations import begin
-from tests.browser.measured import ambiguous, hidden, wandering
+from tests.browser.measured import ambiguous, hidden, thousand, wandering
 from tests.calibrations.test_common_floor import magnetometer
 
 
@@ -95,6 +97,25 @@ def test_a_report_takes_the_search_that_its_session_has_made(turned: ModelSessio
     assert turned.search_made is not None
     _, page = make_report(turned.request, pytest.fail, pytest.fail, lambda: turned)
     assert "misses axis-misalignment" in page()
+
+
+def test_a_session_is_judged_before_its_search_and_not_after_it(turned: ModelSession) -> None:
+    judgement = turned.judged()
+    assert judgement is not None
+    assert judgement.verdict == "incomplete"
+    turned.diagnosed()
+    assert turned.judged() is None  # the search has decided
+
+
+def test_a_model_that_fails_only_by_its_old_values_is_not_called_incomplete(tmp_path: Path) -> None:
+    data = thousand(tmp_path)
+    text = dump_model(model_session(Request(data)).complete_model())
+    (model := tmp_path / "old.yaml").write_text(
+        re.sub(r"(name: bias.*?value: )[\d.]+", r"\g<1>2.4", text, flags=re.DOTALL)
+    )
+    session = model_session(Request(data, str(model)))
+    assert session.compared().fails
+    assert session.judged() is None
 
 
 def test_a_page_plans_the_next_experiment_beside_its_report(tmp_path: Path, undrawn: None) -> None:
