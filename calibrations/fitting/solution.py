@@ -71,7 +71,8 @@ class Solution:
         low, high = self.problem.layout.bounds
         bounds = np.append(low, -no_bound), np.append(high, no_bound)
         prior = np.append(self.problem.layout.prior, no_bound)
-        return held_out(self.residual, jacobian, self.noise, folds(self.table), theta, prior, bounds)
+        reach = np.append(self.problem.layout.typical, no_bound)
+        return held_out(self.residual, jacobian, self.noise, folds(self.table), theta, prior, reach, bounds)
 
     @cached_property
     def cross_validated_excess(self) -> float:
@@ -167,13 +168,15 @@ def held_out(
     fold: NDArray[np.intp],
     theta: Array,
     prior: Array,
+    reach: Array,
     bounds: tuple[Array, Array],
 ) -> float:
     """Pooled rms of the error on unseen rows over the noise floor.
 
     From residual (channels, n), jacobian (channels, n, p), the fold of each row (n,), the parameters (p,), the
-    standard deviation of their priors (p,), inf where there is none, and their bounds. A parameter that the other rows
-    determine badly, such as the loss of a saturation, keeps within its bounds.
+    standard deviation of their priors (p,), inf where there is none, their typical magnitudes (p,) and their bounds. A
+    parameter that the other rows determine badly, such as the loss of a saturation, keeps within its bounds, and changes
+    by about its typical magnitude at most: beyond that, an estimate is not identified, and no jacobian holds.
     """
     channels, n, p = jacobian.shape
     size = np.linalg.norm(jacobian.reshape(channels * n, p), axis=0)
@@ -182,7 +185,8 @@ def held_out(
     white = noise.whiten(np.concatenate([J, residual[:, :, None]], axis=2)).reshape(channels, n, p + 1)
     total = np.einsum("cni,cnj->ij", white, white)
     precision = 1 / (prior * size) ** 2
-    ridge = RIDGE * np.trace(total[:p, :p]) / max(p, 1) * np.eye(p) + np.diag(precision)
+    weak = np.where(np.isfinite(prior), 0.0, 1 / (reach * size) ** 2)
+    ridge = RIDGE * np.trace(total[:p, :p]) / max(p, 1) * np.eye(p) + np.diag(precision + weak)
     pulled = precision * theta * size  # towards the mean of the prior
     low, high = ((bound - theta) * size for bound in bounds)
     error = np.empty_like(residual)

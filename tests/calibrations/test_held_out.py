@@ -39,7 +39,7 @@ def test_equals_a_refit_without_the_fold(square: float) -> None:
     white = white_only(found.problem.white, found.noise.gap_s, 2)
     layout = found.problem.layout
     assert held_out(
-        found.residual, found.jacobian, white, number, found.theta, layout.prior, layout.bounds
+        found.residual, found.jacobian, white, number, found.theta, layout.prior, layout.typical, layout.bounds
     ) == pytest.approx(explicit, rel=1e-8)
 
 
@@ -93,7 +93,8 @@ def test_equals_a_refit_without_the_fold_where_parameters_have_priors() -> None:
         step = np.linalg.lstsq(X, -y, rcond=None)[0]
         error[:, ~kept] = r[:, ~kept] + J[:, ~kept] @ step
     explicit = np.sqrt(np.mean(np.mean(error**2, axis=1) / floor**2))
-    assert held_out(r, J, white, number, found.theta, prior, found.problem.layout.bounds) == pytest.approx(
+    layout = found.problem.layout
+    assert held_out(r, J, white, number, found.theta, prior, layout.typical, layout.bounds) == pytest.approx(
         explicit, rel=1e-6
     )
 
@@ -108,5 +109,18 @@ def test_a_parameter_without_its_rows_keeps_within_its_bounds() -> None:
     noise, theta, prior = white_only(np.ones((1, 40)), np.ones(40), 1), np.zeros(2), np.full(2, np.inf)
     free = (np.full(2, -np.inf), np.full(2, np.inf))
     limited = (np.array([-np.inf, -0.5]), np.array([np.inf, 1.0]))
-    assert held_out(residual, J, noise, fold, theta, prior, free) > 100.0
-    assert held_out(residual, J, noise, fold, theta, prior, limited) < 30.0
+    wide = np.full(2, 1e6)
+    assert held_out(residual, J, noise, fold, theta, prior, wide, free) > 100.0
+    assert held_out(residual, J, noise, fold, theta, prior, wide, limited) < 30.0
+
+
+def test_a_parameter_without_its_rows_changes_by_its_typical_magnitude_at_most() -> None:
+    """Two parameters with nearly the same column: only a row of the fold tells them apart."""
+    x = np.linspace(-1.0, 1.0, 40)
+    fold = np.where(x == x[-1], 0, 1)
+    J = np.column_stack([x, x + 1e-5 * x**2 + 0.3 * (fold == 0)])[None]
+    residual = np.random.default_rng(2).standard_normal((1, 40))
+    noise, theta, prior = white_only(np.ones((1, 40)), np.ones(40), 1), np.zeros(2), np.full(2, np.inf)
+    free = (np.full(2, -np.inf), np.full(2, np.inf))
+    assert held_out(residual, J, noise, fold, theta, prior, np.full(2, 1e9), free) > 30.0
+    assert held_out(residual, J, noise, fold, theta, prior, np.full(2, 1.0), free) < 2.0
