@@ -95,7 +95,7 @@ def _by_score(all_patterns: Sequence[Pattern], screen: Screen) -> list[Pattern]:
     return [all_patterns[i] for i in sorted(range(len(scores)), key=lambda i: scores[i], reverse=True)]
 
 
-def likelihood(squares: float, parameters: int, fit: Fit) -> float:
+def likelihood(squares: float, parameters: float, fit: Fit) -> float:
     """Twice the log-likelihood of a sum of whitened squares, minus log(rows) for each parameter (Schwarz)."""
     rows = fit.residual.size
     return -rows * float(np.log(max(squares, 1e-300) / rows)) - parameters * float(np.log(rows))
@@ -231,4 +231,4 @@ def _contains(pattern: Pattern, start: Fit, end: Fit, screen: Screen) -> bool:
 
 def _likelihood_with_effects(end: Fit, white_start: Fit) -> float:
     white = white_start.noise.whiten(end.residual[:, :, None])[:, 0]
-    return likelihood(float(white @ white), len(end.theta) - len(white_start.theta), white_start)
+    return likelihood(float(white @ white), end.effective_parameters - len(white_start.theta), white_start)

@@ -60,8 +60,11 @@ class Solution:
 
     @cached_property
     def held_out_excess(self) -> float:
-        """Pooled rms of the error on unseen rows over the noise floor."""
-        return self.held_out_with(np.zeros((*self.residual.shape, 0)))
+        """Pooled rms of the error on unseen rows over the noise floor.
+
+        It is at least that on the rows of the fit. Where the linear step promises less, the fit is not at a minimum.
+        """
+        return max(self.held_out_with(np.zeros((*self.residual.shape, 0))), self.pooled_excess)
 
     def held_out_with(self, extra: Array) -> float:
         """The held-out error with columns (channels, n, k) added to the fit."""
@@ -82,8 +85,12 @@ class Solution:
         a saturation. Source: Golub, Heath and Wahba, Technometrics 21 (1979) 215.
         """
         rows = self.residual.size
-        parameters = parameters_of_rows(self.whitened[:, 1:], self.problem.layout.prior)
-        return self.pooled_excess * rows / max(rows - parameters, 1.0)
+        return self.pooled_excess * rows / max(rows - self.effective_parameters, 1.0)
+
+    @cached_property
+    def effective_parameters(self) -> float:
+        """The number of parameters that the rows determine; a parameter that its prior holds counts less than one."""
+        return parameters_of_rows(self.whitened[:, 1:], self.problem.layout.prior)
 
     def share_left(self, start: Solution) -> float:
         """Part of the excess variance of `start` that this fit does not explain.
