@@ -69,7 +69,7 @@ def select(
         best = _next(g, sizes, pools, stale, max(limit, SPILL * (sizes.deviance - g.rows)))
         if best is not None:
             larger = estimate(g, {**sizes.variances, best[0]: best[2]}, most, 12)
-            if _cancels(g, larger):
+            if _cancelled(g, larger) - _cancelled(g, sizes):
                 pools = [{name: c for name, c in pool.items() if name != best[0]} for pool in pools]
                 continue
             sizes = larger
@@ -89,16 +89,16 @@ def select(
     return estimate(g, sizes.variances, most)
 
 
-def _cancels(g: Gram, sizes: Sizes) -> bool:
-    """Whether a component is far larger than the signal, so that another one cancels it."""
-    start = 0
+def _cancelled(g: Gram, sizes: Sizes) -> set[str]:
+    """The components that are far larger than the signal, so that others cancel them."""
+    start, names = 0, set()
     for name in sizes.variances:
         block = g.blocks[name]
         u = sizes.coefficients[start : start + block.stop - block.start]
         start += len(u)
         if float(u @ g.products[block, block] @ u) > CANCELS * g.squares:
-            return True
-    return False
+            names.add(name)
+    return names
 
 
 def _next(
@@ -173,7 +173,7 @@ def _exchange(g: Gram, sizes: Sizes, by_name: Mapping[str, Component], most: Map
         if best is None or best[0] == name or best[1] < loss_of_component + 1.0:
             continue
         exchanged = estimate(g, {**reduced.variances, best[0]: best[2]}, most, 12)
-        if _cancels(g, exchanged):
+        if _cancelled(g, exchanged) - _cancelled(g, sizes):
             continue
         improvement = sizes.deviance + component_price - exchanged.deviance - price(by_name[best[0]], acting_at)
         if improvement > 1.0:
