@@ -181,9 +181,9 @@ def held_out(
     """Pooled rms of the error on unseen rows over the noise floor.
 
     From residual (channels, n), jacobian (channels, n, p), the fold of each row (n,), the parameters (p,), the
-    standard deviation of their priors (p,), inf where there is none, their typical magnitudes (p,) and their bounds. A
-    parameter that the other rows determine badly, such as the loss of a saturation, keeps within its bounds, and changes
-    by about its typical magnitude at most: beyond that, an estimate is not identified, and no jacobian holds.
+    standard deviation of their priors (p,), inf where there is none, their typical magnitudes `reach` (p,) and their
+    bounds. A parameter that the other rows determine badly, such as the loss of a saturation, keeps within its bounds,
+    and changes by about its typical magnitude at most: an estimate that is less certain is not identified.
     """
     channels, n, p = jacobian.shape
     size = np.linalg.norm(jacobian.reshape(channels * n, p), axis=0)
