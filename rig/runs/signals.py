@@ -58,13 +58,12 @@ def stoppable(ignored: Collection[signal.Signals] = (), inner: bool = False) -> 
     interrupter = _Interrupter()
     hook, sys.unraisablehook = sys.unraisablehook, interrupter.recover
     nohup = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN  # then a closed terminal must not stop the run
-    handlers = {
-        number: signal.signal(number, signal.SIG_IGN if number in ignored else interrupter.stop)
-        for number in SIGNALS
-        if not (nohup and number == signal.SIGHUP)
-    }
-    handlers[signal.SIGALRM] = signal.signal(signal.SIGALRM, interrupter.stop_again)
+    numbers = [number for number in SIGNALS if not (nohup and number == signal.SIGHUP)]
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGALRM, *numbers)}
     try:
+        signal.signal(signal.SIGALRM, interrupter.stop_again)
+        for number in numbers:  # within `try`: a signal may come before the last of them
+            signal.signal(number, signal.SIG_IGN if number in ignored else interrupter.stop)
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
@@ -95,6 +94,7 @@ class _Interrupter:
             return
         for signal_number in SIGNALS:
             signal.signal(signal_number, signal.SIG_IGN)
+        self._delayed = None  # an earlier one that waits is the same stop: raised again, it would interrupt the stop
         self._raised = number
         self.fired.append(number)
         raise KeyboardInterrupt(signal.Signals(number).name)

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from threading import Event
 from types import FunctionType
+from typing import Any
 
 import pytest
 
@@ -145,3 +146,46 @@ def test_a_computing_world_and_a_screen_half_written_are_not_interrupted(module:
 )
 def test_every_wait_for_a_person_can_be_stopped(module: str, name: str) -> None:
     assert signalled_in(module, name) == []
+
+
+def delay_a_signal() -> None:
+    """A signal during a computation of the simulated world, which waits for the timer."""
+    code = (lambda: signal.raise_signal(signal.SIGINT)).__code__
+    FunctionType(code, {"signal": signal, "__name__": "drivers.world.world"})()
+
+
+def test_a_signal_that_waits_and_a_further_one_stop_once() -> None:
+    """A second exception would interrupt the stop of the instruments."""
+    stopped: list[str] = []
+
+    def stop_while_a_signal_waits() -> None:
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})
+        delay_a_signal()
+        try:
+            signal.raise_signal(signal.SIGINT)
+        finally:
+            while signal.SIGALRM not in signal.sigpending():
+                pass
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGALRM})
+            stopped.append("at rest")
+
+    with pytest.raises(KeyboardInterrupt), stoppable():
+        stop_while_a_signal_waits()
+    assert stopped == ["at rest"]
+
+
+def test_a_signal_while_the_handlers_are_set_leaves_the_earlier_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = [signal.getsignal(each) for each in (*SIGNALS, signal.SIGALRM)]
+    set_handler, raised = signal.signal, list[int]()
+
+    def set_and_raise(number: int, handler: Any) -> Any:
+        earlier = set_handler(number, handler)
+        if number == signal.SIGINT and not raised:
+            raised.append(number)
+            signal.raise_signal(signal.SIGINT)
+        return earlier
+
+    monkeypatch.setattr(signal, "signal", set_and_raise)
+    with pytest.raises(KeyboardInterrupt), stoppable():
+        pass
+    assert [signal.getsignal(each) for each in (*SIGNALS, signal.SIGALRM)] == before
