@@ -254,19 +254,15 @@ def descend(
     """
     point = _begin(setting, general, loops, jumps) if origin is None else origin.point
     progress = _Progress(point, {})
-    first, results = 0 if origin is None else len(COARSE), list[SearchResult]()
+    first, trials = 0 if origin is None else len(COARSE), 0
     for number in range(first, ROUNDS):
         report(f"searching for places ({step}), pass {number - first + 1} of at most {ROUNDS - first}")
         progress = _advance(setting, progress, number, catalogue_first)
-        if jumps and len(results) < JUMP_TRIALS and (progress.converged or number == ROUNDS - 3):
-            results.append(_finish(setting, progress))
+        if jumps and trials < JUMP_TRIALS and (progress.converged or number == ROUNDS - 3):
+            trials += 1
             progress = _with_jumps(setting, progress)
         if progress.converged:
             break
-    return min([_finish(setting, progress), *results], key=lambda result: result.criterion)
-
-
-def _finish(setting: Setting, progress: _Progress) -> SearchResult:
     return finish(setting, progress.point, progress.scales, progress.limits or {})
 
 
@@ -344,13 +340,11 @@ def _with_jumps(setting: Setting, progress: _Progress) -> _Progress:
     before = next((c for c in point.components if c.name == STEPS), None)
     if steps is None or (before is not None and before.form == steps.form):
         return progress
-    others, limits = point.without({STEPS}), progress.limits or {}
+    others = point.without({STEPS})
     components = [*others.components, steps]
-    variances = {**others.variances, STEPS: point.variances.get(STEPS, setting.misfit(point.state) * setting.floor**2)}
-    with_steps = Point(components, variances, others.values, setting.state_at(others.values, components))
-    X, g = setting.linearise(with_steps, {name: scale for name, scale in progress.scales.items() if name != STEPS})
-    moved = _take_step(setting, with_steps, X, g, estimate(g, variances, limits), limits)
-    return replace(progress, point=moved, scales=g.scales, converged=False)
+    state = setting.state_at(others.values, others.components)
+    scales = {name: scale for name, scale in progress.scales.items() if name != STEPS}
+    return replace(progress, point=replace(others, components=components, state=state), scales=scales, converged=False)
 
 
 def _take_step(setting: Setting, point: Point, X: Array, g: Gram, sizes: Sizes, limits: Mapping[str, float]) -> Point:
