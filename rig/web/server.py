@@ -11,19 +11,22 @@ from contextlib import closing
 from dataclasses import dataclass
 from urllib.parse import parse_qs
 
+import numpy as np
 import uvicorn
 from fastapi import FastAPI
 from nicegui import Client, core, run, ui
 from nicegui.translations import translations
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from calibrations.discovery.rows import Rows
+from calibrations.model.file import read_model
+from calibrations.table import Table
 from rig.errors import RigError
 from rig.runs.signals import signal_handlers
 from rig.web.calculations import begin, leave_calculations
 from rig.web.desk import Desk
 from rig.web.frame import TITLE
 from rig.web.guard import TOKEN, Guard, names
-from rig.web.load_ahead import load_ahead
 from rig.web.pages import register
 
 LOST = {  # the message of a page whose server does not answer
@@ -35,6 +38,7 @@ RETURN_S = 20.0  # a browser that lost the connection may come back so long; its
 LEFT = 1001  # the code with which a browser closes the connection of a page that it leaves (RFC 6455, 7.4.1)
 PING_S, ANSWER_S = 8.0, 20.0  # between two looks at a connection, and until it counts as lost: an analysis delays both
 PORT = 8473  # preferred, so that an open page finds a restarted server
+POSES = 36  # of the analysis at the start
 
 
 @dataclass(frozen=True)
@@ -144,3 +148,28 @@ def _open_listening_socket(host: str, port: int) -> socket.socket:
         listener.close()
         raise
     return listener
+
+
+def load_ahead() -> None:
+    """Fit and compare a few poses of an ideal sensor, so that the first analysis does not wait for compiled loops."""
+    data = Rows(_sweep())
+    data.compare(data.fit_without_outliers(read_model("linear"))[1].model)
+
+
+def _sweep() -> Table:
+    """Three turns of a sensor of 1 V/g with a pattern in place of noise."""
+    alpha_deg, beta_deg = np.repeat([90.0, 30.0, 150.0], POSES // 3), np.tile(np.arange(0.0, 360.0, 30.0), 3)
+    load, turn = np.sin(np.radians(alpha_deg)), np.radians(beta_deg)
+    pattern = 1e-5 * np.cos(np.arange(POSES) ** 2)
+    columns = {
+        "alpha_deg": alpha_deg,
+        "beta_deg": beta_deg,
+        "direction": np.ones(POSES),
+        "vx_v": 2.5 + load * np.cos(turn) + pattern,
+        "vy_v": 2.5 + load * np.sin(turn) - pattern,
+        "vx_std_v": np.full(POSES, 1e-3),
+        "vy_std_v": np.full(POSES, 1e-3),
+        "n": np.full(POSES, 1000.0),
+        "t_s": 10.0 * np.arange(POSES),
+    }
+    return Table.from_columns("poses", columns, {"filter_corner_hz": 15.0, "sample_rate_hz": 1000.0}, "ideal")

@@ -26,7 +26,7 @@ from rig.web.pages import register
 from tests.rig.conftest import WORD, Ended
 from tests.rig.postgres import Server
 from tests.rig.pushing import a_run, pushed
-from tests.rig.test_page_left import without_browser
+from tests.rig.test_web_analyses import without_browser
 
 Rig = Callable[..., Ended]
 

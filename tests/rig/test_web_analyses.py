@@ -1,8 +1,10 @@
-"""A page that is closed ends the analyses that it waits for."""
+"""The analyses of a server: what it loads ahead of the first one, and that a closed page ends its own."""
 
 from __future__ import annotations
 
 import asyncio
+import subprocess
+import sys
 import threading
 from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager
@@ -25,9 +27,22 @@ from rig.web.calculations import Visit, begin, off_loop
 from rig.web.desk import Desk
 from rig.web.pages import register
 from rig.web.server import LeftPages
-from tests.browser.measured import two_faults
+from tests.browser.measured import hidden, two_faults
 
 SEARCH = "diagnosed"  # the thread of a search has the name of what it computes
+FIRST_ANALYSIS = """import sys
+from calibrations.means import kernels
+from rig.services.request import Request
+from rig.services.session import model_session
+from rig.web.server import load_ahead
+
+loops = [each for each in vars(kernels).values() if hasattr(each, "nopython_signatures")]
+load_ahead()
+ahead = [each.nopython_signatures for each in loops]
+session = model_session(Request(sys.argv[1]))
+session.compared()
+print(any(ahead), ahead == [each.nopython_signatures for each in loops])
+"""
 
 
 @asynccontextmanager
@@ -250,3 +265,9 @@ def test_a_visit_ends_its_searches_and_its_steps(tmp_path: Path, monkeypatch: py
         visits[0].check()
     with pytest.raises(Cancelled):  # a report fits the model, and is left before the search
         make_report(Request(two_faults(tmp_path), "linear"), print, visits[0].searched)
+
+
+def test_the_first_analysis_loads_no_machine_code(tmp_path: Path) -> None:
+    words = [sys.executable, "-c", FIRST_ANALYSIS, hidden(tmp_path, "package turned")]
+    ended = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert ended.stdout == "True True\n"
