@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from calibrations.discovery.structure import _likelihood_with_effects, likelihood, without_slow
 from calibrations.fitting.fit import fit, refit
 from calibrations.fitting.solution import folds, held_out
 from calibrations.free_forms.bases import spline
@@ -124,3 +125,24 @@ def test_a_parameter_without_its_rows_changes_by_its_typical_magnitude_at_most()
     free = (np.full(2, -np.inf), np.full(2, np.inf))
     assert held_out(residual, J, noise, fold, theta, prior, np.full(2, 1e9), free) > 30.0
     assert held_out(residual, J, noise, fold, theta, prior, np.full(2, 1.0), free) < 2.0
+
+
+def test_parameters_that_their_priors_hold_do_not_count_whole() -> None:
+    """A pattern competes with the effects by their number: a free form must not count as all its coefficients."""
+    data = table(0.003)
+    start = fit(read_model("linear"), data)
+    assert start.effective_parameters == pytest.approx(len(start.theta), rel=1e-6)
+    over = spline(np.linspace(-1.0, 1.0, 50), 8)
+    counts = []
+    for size in (1e-9, 2e-4):
+        form = Form("own-response", "curve", "own", (over, over), sizes=(size, size))
+        found = refit(start, start.model.with_effect(free_form((form,))))
+        counts.append(found.effective_parameters)
+        assert found.effective_parameters < len(found.theta) - 1
+    assert counts[0] == pytest.approx(len(start.theta), abs=0.01)
+    assert counts[1] > counts[0] + 1
+    white, rows = without_slow(start), start.residual.size
+    squares = float(np.sum(white.noise.whiten(found.residual[:, :, None]) ** 2))
+    by_all = likelihood(squares, len(found.theta) - len(start.theta), white)
+    fewer = len(found.theta) - found.effective_parameters
+    assert _likelihood_with_effects(found, white) == pytest.approx(by_all + fewer * np.log(rows))
