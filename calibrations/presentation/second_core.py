@@ -30,6 +30,7 @@ class SecondCore:
     command: Sequence[str] = PROCESS
     _process: subprocess.Popen[bytes] | None = None
     _lock: Lock = field(default_factory=Lock)
+    _ahead: Waiting = field(default_factory=deque)
 
     def start(self) -> None:
         """Start the process, if it does not run: it loads matplotlib while the charts are computed."""
@@ -48,8 +49,8 @@ class SecondCore:
 
     def draw(self, pictures: Sequence[Picture]) -> None:
         """Draw the pictures, so that their page finds them in memory."""
-        contents = ((pickle.dumps((picture.chart, picture.name, picture.words)), picture) for picture in pictures)
-        waiting = deque((content, picture) for content, picture in contents if drawn(content) is None)
+        self._ahead.clear()
+        waiting = _undrawn(pictures)
         helper = Thread(target=self._draw_beside, args=(waiting,), daemon=True)
         helper.start()
         try:
@@ -59,6 +60,16 @@ class SecondCore:
         finally:
             waiting.clear()  # if the page was left
         helper.join()
+
+    def draw_ahead(self, pictures: Sequence[Picture]) -> Thread:
+        """Let the second process alone draw pictures that a page may soon need, in a thread that is returned.
+
+        It leaves the rest as soon as a page needs pictures.
+        """
+        self._ahead = _undrawn(pictures)
+        helper = Thread(target=self._draw_beside, args=(self._ahead,), daemon=True)
+        helper.start()
+        return helper
 
     def _draw_beside(self, waiting: Waiting) -> None:
         """Let the second process draw pictures as long as some wait."""
@@ -89,6 +100,12 @@ class SecondCore:
             with self._process as process:
                 process.kill()
             self._process = None
+
+
+def _undrawn(pictures: Sequence[Picture]) -> Waiting:
+    """Those of the pictures that are not in memory."""
+    contents = ((pickle.dumps((picture.chart, picture.name, picture.words)), picture) for picture in pictures)
+    return deque((content, picture) for content, picture in contents if drawn(content) is None)
 
 
 def _next(waiting: Waiting) -> tuple[bytes, Picture] | None:

@@ -20,6 +20,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from calibrations.discovery.rows import Rows
 from calibrations.model.file import read_model
+from calibrations.presentation.charts.fit import fit_album
+from calibrations.presentation.second_core import SecondCore
 from calibrations.table import Table
 from rig.errors import RigError
 from rig.runs.signals import signal_handlers
@@ -79,7 +81,7 @@ def serve(desk: Desk, host: str, port: int | None, token: str, ready: Callable[[
 
     def started() -> None:
         ready(place)
-        begin(load_ahead)
+        begin(load_ahead, desk.second_core)
 
     guarded = Guard(LeftPages(app), place.token, names(host, place.port))
     config = uvicorn.Config(
@@ -150,10 +152,15 @@ def _open_listening_socket(host: str, port: int) -> socket.socket:
     return listener
 
 
-def load_ahead() -> None:
-    """Fit and compare a few poses of an ideal sensor, so that the first analysis does not wait for compiled loops."""
+def load_ahead(second_core: SecondCore) -> None:
+    """Fit a few poses of an ideal sensor and draw them, for the first analysis and the first report.
+
+    That loads the compiled loops, and compiles them where needed, and in both processes what draws pictures.
+    """
     data = Rows(_sweep())
-    data.compare(data.fit_without_outliers(read_model("linear"))[1].model)
+    comparison = data.compare(data.fit_without_outliers(read_model("linear"))[1].model)
+    second_core.start()
+    second_core.draw(fit_album(comparison.fit))
 
 
 def _sweep() -> Table:

@@ -7,6 +7,7 @@ import pickle
 import sys
 from collections import OrderedDict
 from collections.abc import Iterator
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -47,6 +48,31 @@ def test_pictures_are_the_same_as_without_a_second_process(core: SecondCore) -> 
     core.draw(PICTURES)
     assert elements() == drawn_here()
     assert [static.inline(each.chart, each.name, each.words) for each in PICTURES] == elements()
+
+
+def test_pictures_drawn_ahead_are_in_memory(core: SecondCore, monkeypatch: pytest.MonkeyPatch) -> None:
+    core.start()
+    core.draw_ahead(PICTURES).join(60)
+    here = drawn_here()
+    monkeypatch.setattr(static, "_draw_inline", lambda *_: "drawn again")
+    core.draw(PICTURES)
+    assert elements() == here
+
+
+def test_a_page_that_needs_pictures_ends_the_drawing_ahead(core: SecondCore) -> None:
+    core.command = (sys.executable, "-c", "import sys; sys.stdin.read()")  # it never draws
+    core.start()
+    ahead = core.draw_ahead(PICTURES)
+    page = Thread(target=core.draw, args=(PICTURES[1:],))
+    page.start()
+    for _ in range(6000):
+        if len([each for each in elements() if each]) == 3:
+            break
+        page.join(0.01)
+    core.stop()
+    ahead.join(60)
+    page.join(60)
+    assert elements()[0] == ""
 
 
 @pytest.mark.parametrize("program", ["raise SystemExit", "print('no picture')"])

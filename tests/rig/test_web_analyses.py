@@ -7,8 +7,10 @@ import subprocess
 import sys
 import threading
 from collections.abc import AsyncIterator, Iterator, Mapping
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, closing
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 from urllib.parse import quote
 
 import pytest
@@ -16,6 +18,7 @@ from nicegui import Client, ui
 from nicegui.testing import User, user_simulation
 from starlette.types import Message, Receive, Scope, Send
 
+from calibrations.presentation import static
 from procedures.catalogue import Procedure
 from rig.bench import DEFAULT, Bench
 from rig.planning.plan import plan
@@ -26,18 +29,20 @@ from rig.services.session import ModelSession
 from rig.web.calculations import Visit, begin, off_loop
 from rig.web.desk import Desk
 from rig.web.pages import register
+from rig.web.pages.run_report import draw_ahead, report_html
 from rig.web.server import LeftPages
 from tests.browser.measured import hidden, two_faults
 
 SEARCH = "diagnosed"  # the thread of a search has the name of what it computes
 FIRST_ANALYSIS = """import sys
 from calibrations.means import kernels
+from calibrations.presentation.second_core import SecondCore
 from rig.services.request import Request
 from rig.services.session import model_session
 from rig.web.server import load_ahead
 
 loops = [each for each in vars(kernels).values() if hasattr(each, "nopython_signatures")]
-load_ahead()
+load_ahead(SecondCore(("/no/such/program",)))
 ahead = [each.nopython_signatures for each in loops]
 session = model_session(Request(sys.argv[1]))
 session.compared()
@@ -265,6 +270,19 @@ def test_a_visit_ends_its_searches_and_its_steps(tmp_path: Path, monkeypatch: py
         visits[0].check()
     with pytest.raises(Cancelled):  # a report fits the model, and is left before the search
         make_report(Request(two_faults(tmp_path), "linear"), print, visits[0].searched)
+
+
+def test_a_report_drawn_ahead_draws_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    desk, data = Desk(None), two_faults(tmp_path)
+    with closing(desk):
+        session = desk.beginning(data)
+        session.diagnosed()
+        draw_ahead(desk, data, session).join(60)
+        monkeypatch.setattr(static, "_draw_inline", lambda *_: "drawn here")
+        visit = SimpleNamespace(searched=CountedEffects)
+        text = report_html(desk, Request(data), cast(Visit, visit), lambda: session, plans_next=False)
+    assert text.count("<svg") >= 5
+    assert "drawn here" not in text
 
 
 def test_the_first_analysis_loads_no_machine_code(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +29,7 @@ from rig.web.pages.model_noise import NoisePictures
 from rig.web.pages.model_parameters import ParametersBox
 from rig.web.pages.model_pictures import Pictures
 from rig.web.pages.model_verdict import VerdictBox
+from rig.web.pages.run_report import draw_ahead
 from rig.web.parts import afresh, box, div, for_page, message, notify_error, show_error, show_remark, state, words
 
 if TYPE_CHECKING:
@@ -250,7 +252,13 @@ class Workbench:
         if turn == self.turn:
             self.verdict.found(self.diagnoses[key])
             self.parameters.diagnosed(self.diagnoses[key])
-            await self.missing.show(self.diagnoses[key])
+            await asyncio.gather(self.missing.show(self.diagnoses[key]), self._draw_report_ahead(session))
+
+    async def _draw_report_ahead(self, session: ModelSession[Any]) -> None:
+        """Draw what the report on the data would show: the search, which takes longest, is known."""
+        if session.data.form == "rows" and not (session.names or self.model or self.noise):
+            with suppress(Cancelled, Exception):  # the report itself says why it cannot be made
+                await self.visit.work(draw_ahead, self.desk, self.data, session)
 
     def left(self) -> None:
         """End the search for missing effects: the page is closed, and nobody waits for the result."""

@@ -9,6 +9,7 @@ import html
 import re
 from collections.abc import Callable, Sequence
 from functools import partial
+from threading import Thread
 from typing import Any
 
 from nicegui import ui
@@ -104,6 +105,17 @@ def report_html(
         desk.second_core.draw(pictures)
         desk.keep_report(key, make())
     return desk.reports[key]
+
+
+def draw_ahead(desk: Desk, data: str, session: ModelSession[Any]) -> Thread:
+    """Let the second process draw the pictures of the report on a session whose search is known.
+
+    The report is then there soon after a person asks for it. The thread ends with the last picture.
+    """
+    request = Request(data, None, desk.bench_file)
+    desk.second_core.start()
+    pictures, _ = make_report(request, lambda _: None, lambda effects: effects, lambda: session, plans_next=False)
+    return desk.second_core.draw_ahead(pictures)
 
 
 async def download_report(
