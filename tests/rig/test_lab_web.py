@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Coroutine, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
@@ -107,9 +107,10 @@ def visiting(path: str, visit: Callable[[User], Coroutine[Any, Any, None]]) -> N
 
     async def simulated() -> None:
         async with without_browser() as user:
-            register(Desk(None))
-            await user.open(path)
-            await visit(user)
+            with closing(Desk(None)) as desk:
+                register(desk)
+                await user.open(path)
+                await visit(user)
 
     asyncio.run(simulated())
 
