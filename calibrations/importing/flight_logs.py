@@ -46,8 +46,8 @@ def ulog_topics(path: Path) -> list[Topic]:
     """The messages of a PX4 log, raw sensors first. Raises DataError."""
     core = library("pyulog.core", "robotics", path, "a PX4 ULog")
     require_size(path, path.stat().st_size)
-    with _quiet():
-        log = core.ULog(str(path))
+    with _quiet(), path.open("rb") as file:  # the library leaves a damaged log open
+        log = core.ULog(file)
     if not log.data_list:
         raise DataError(f"{path}: has no data: it is cut or damaged near its start; copy it again from the vehicle")
     remarks = list(_ulog_remarks(path, log))

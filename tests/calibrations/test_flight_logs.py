@@ -6,6 +6,7 @@ import os
 import struct
 import sys
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 import pytest
@@ -207,3 +208,17 @@ def test_a_ulog_without_data_is_refused_without_the_words_of_the_library(
     with pytest.raises(DataError, match="cut or damaged near its start"):
         open_sheet(path)
     assert capsys.readouterr() == ("", "")
+
+
+def test_a_log_that_the_library_cannot_read_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, opened = tmp_path / "damaged.ulg", list[BinaryIO]()
+    path.write_bytes(ulog(("sensor_accel", 0, 7)))
+
+    def fail(file: BinaryIO) -> None:
+        opened.append(file)
+        raise ValueError
+
+    monkeypatch.setattr("pyulog.core.ULog", fail)
+    with pytest.raises(ValueError):  # noqa: PT011 the error above
+        flight_logs.ulog_topics(path)
+    assert opened[0].closed
