@@ -64,9 +64,10 @@ class SecondCore:
     def draw_ahead(self, pictures: Sequence[Picture]) -> Thread:
         """Let the second process alone draw pictures that a page may soon need, in a thread that is returned.
 
-        It leaves the rest as soon as a page needs pictures.
+        It leaves the rest as soon as a page needs pictures, or others are to be drawn ahead.
         """
-        self._ahead = _undrawn(pictures)
+        self._ahead.clear()
+        self._ahead.extend(_undrawn(pictures))
         helper = Thread(target=self._draw_beside, args=(self._ahead,), daemon=True)
         helper.start()
         return helper

@@ -36,6 +36,7 @@ from tests.browser.measured import hidden, two_faults
 SEARCH = "diagnosed"  # the thread of a search has the name of what it computes
 FIRST_ANALYSIS = """import sys
 from calibrations.means import kernels
+from calibrations.presentation import static
 from calibrations.presentation.second_core import SecondCore
 from rig.services.request import Request
 from rig.services.session import model_session
@@ -46,7 +47,7 @@ load_ahead(SecondCore(("/no/such/program",)))
 ahead = [each.nopython_signatures for each in loops]
 session = model_session(Request(sys.argv[1]))
 session.compared()
-print(any(ahead), ahead == [each.nopython_signatures for each in loops])
+print(any(ahead), len(static._DRAWN) > 0, ahead == [each.nopython_signatures for each in loops])
 """
 
 
@@ -285,7 +286,23 @@ def test_a_report_drawn_ahead_draws_nothing(tmp_path: Path, monkeypatch: pytest.
     assert "drawn here" not in text
 
 
+def test_the_first_visit_after_a_search_draws_its_report_ahead(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    desk, data, drawn = Desk(DEFAULT), two_faults(tmp_path), list[str]()
+    monkeypatch.setattr("rig.web.pages.model.draw_ahead", lambda _, data, __: drawn.append(data))
+
+    async def simulated() -> None:
+        async with without_browser() as user:
+            register(desk)
+            for _ in range(2):
+                await user.open(f"/?data={quote(data)}")
+                await user.should_see("Missing, in the order in which they are added", retries=600)
+                await asyncio.sleep(0.2)
+
+    asyncio.run(simulated())
+    assert drawn == [data]
+
+
 def test_the_first_analysis_loads_no_machine_code(tmp_path: Path) -> None:
     words = [sys.executable, "-c", FIRST_ANALYSIS, hidden(tmp_path, "package turned")]
     ended = subprocess.run(words, capture_output=True, text=True, check=True)
-    assert ended.stdout == "True True\n"
+    assert ended.stdout == "True True True\n"

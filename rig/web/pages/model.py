@@ -235,7 +235,7 @@ class Workbench:
         await asyncio.gather(self.parameters.show(session), self._diagnose(session, turn))
 
     async def _diagnose(self, session: ModelSession[Any], turn: int) -> None:
-        key = session.names
+        key, is_first = session.names, session.search_made is None
         if key not in self.diagnoses:
             search = self.visit.searched(session.effects)
             self.missing.wait(search)
@@ -252,7 +252,8 @@ class Workbench:
         if turn == self.turn:
             self.verdict.found(self.diagnoses[key])
             self.parameters.diagnosed(self.diagnoses[key])
-            await asyncio.gather(self.missing.show(self.diagnoses[key]), self._draw_report_ahead(session))
+            ahead = [self._draw_report_ahead(session)] if is_first else []
+            await asyncio.gather(self.missing.show(self.diagnoses[key]), *ahead)
 
     async def _draw_report_ahead(self, session: ModelSession[Any]) -> None:
         """Draw what the report on the data would show: the search, which takes longest, is known."""
