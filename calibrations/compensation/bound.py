@@ -145,6 +145,9 @@ def _bound_function(name: str, *inner: Pair) -> Pair:
         case "exp":
             value = x.monotone("exp")
             return value, value * dx
+        case "tanh":
+            value = x.monotone("tanh")
+            return value, (point_interval(np.ones(value.low.shape)) - _square(value)) * dx
         case "log":
             domain = Interval(np.where(x.low > 0, x.low, np.nan), x.high)
             return _without_nan(domain.monotone("log")), dx / x

@@ -37,7 +37,7 @@ RESERVED = re.compile(
     r"t\d+|table\d+|in|out|step|math|memory|a[xyz]|v[xyz]|m\d+[xyz]"  # of the sources themselves
     r"|auto|case|char|const|default|do|double|enum|extern|float|goto|inline|int|long|register|restrict|short|signed"
     r"|sizeof|static|struct|switch|typedef|union|unsigned|void|volatile"  # of C
-    r"|abs|min|max|fabs|sqrt|exp|log|sin|cos"  # functions
+    r"|abs|min|max|fabs|sqrt|exp|log|sin|cos|tanh"  # functions
 )
 
 

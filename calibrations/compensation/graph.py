@@ -57,6 +57,7 @@ OPERATIONS: Mapping[str, Operation] = {
         "({0} != 0 ? {1} : {2})", "({1} if {0} != 0 else {2})", "compare",
     ),
     "sqrt": _function("sqrt", np.sqrt),
+    "tanh": _function("tanh", np.tanh),
     "exp": _function("exp", np.exp),
     "log": _function("log", np.log),
     "sin": _function("sin", np.sin),

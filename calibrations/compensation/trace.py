@@ -24,7 +24,7 @@ from calibrations.table import AXES, STANDARD_GRAVITY
 UFUNCS = {
     "add": "+", "subtract": "-", "multiply": "*", "divide": "/", "negative": "neg", "absolute": "abs", "fabs": "abs",
     "minimum": "min", "maximum": "max", "sign": "sign", "sqrt": "sqrt", "exp": "exp", "log": "log", "sin": "sin",
-    "cos": "cos", "less": "<", "less_equal": "<=", "greater": ">", "greater_equal": ">=", "equal": "==",
+    "cos": "cos", "tanh": "tanh", "less": "<", "less_equal": "<=", "greater": ">", "greater_equal": ">=", "equal": "==",
     "not_equal": "!=",
 }  # fmt: skip
 HIGHEST_POWER = 8
@@ -191,7 +191,8 @@ FUNCTIONS: Mapping[Callable[..., Any], Callable[..., Any]] = {
 AS_NUMPY: Mapping[str, Callable[..., Any]] = {
     "+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power, "neg": np.negative,
     "pos": np.positive, "<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal, "==": np.equal,
-    "!=": np.not_equal, "sin": np.sin, "cos": np.cos, "tan": np.tan, "exp": np.exp, "log": np.log, "sqrt": np.sqrt,
+    "!=": np.not_equal, "sin": np.sin, "cos": np.cos, "tan": np.tan, "tanh": np.tanh, "exp": np.exp, "log": np.log,
+    "sqrt": np.sqrt,
     "abs": np.abs, "sign": np.sign, "where": np.where,
     "step": lambda x: np.greater_equal(x, 0.0),
     "min": lambda *arguments: reduce(np.minimum, arguments),

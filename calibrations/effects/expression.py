@@ -349,6 +349,7 @@ FUNCTIONS: Mapping[str, Operation] = {
         _unary("sin", np.sin),
         _unary("cos", np.cos),
         _unary("tan", np.tan),
+        _unary("tanh", np.tanh),
         _unary("exp", _exp),
         _unary("log", _log),
         _unary("sqrt", np.sqrt),

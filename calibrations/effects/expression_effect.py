@@ -96,7 +96,7 @@ class _FromExpression(Effect):
         self.name, self.expression = name, expression.text
         self.formula = expression.text if "+=" in expression.text else f"v += {expression.text}"
         self.needs = _required_columns(expression, parameters)
-        self.kinds = ACCELEROMETER_KINDS if target == "v" else ("poses", "motion")
+        self.kinds = ("poses", "motion") if _is_on_angle(expression) else ACCELEROMETER_KINDS
         self.constants = {_scale(p): partial(_size, expression, parameters, p) for p in parameters}
         self.parameters = tuple(
             Parameter(

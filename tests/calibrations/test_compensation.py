@@ -324,13 +324,16 @@ def test_part_of_a_saturation_is_inverted() -> None:
 
 def test_own_expressions_are_inverted_where_a_product_knows_their_variables() -> None:
     texts = {
-        "own-bend": "v += a*ax*ay + b*exp(-t/600) + c*max(ax, 0)**2",
+        "own-bend": "v += a*ax*ay + b*exp(-t/600) + c*max(ax, 0)**2 + d*tanh(4*ay)",
         "own-wet": "vx += k*humidity_pct*(1 + step(temperature - 30))",
         "own-gear": "beta_deg += a*sin(5*beta)",
         "own-angle": "vy += a*sin(5*alpha)",
     }
     own = {name: own_effect(name, text, ("humidity_pct",) if "pct" in text else ()) for name, text in texts.items()}
-    values = {"own-bend": {"a": (0.01, 0.0), "b": (0.01, 0.02), "c": (0.0, 0.01)}, "own-wet": {"k": 1e-4}}
+    values = {
+        "own-bend": {"a": (0.01, 0.0), "b": (0.01, 0.02), "c": (0.0, 0.01), "d": (1e-3, 0.0)},
+        "own-wet": {"k": 1e-4},
+    }
     fitted = model({**LINEAR, **values, "own-gear": {"a": 0.1}, "own-angle": {"a": 0.001}}, own)
     with pytest.raises(ModelError, match="--input humidity_pct=LOW:HIGH"):
         invert_model(fitted)

@@ -28,6 +28,7 @@ VALUES = [
     ("max(t, 0)", [0, 0, 0.5, 3]),
     ("sin(t)**2 + cos(t)**2", np.ones(4)),
     ("exp(log(abs(t) + 1))", np.abs(T) + 1),
+    ("tanh(t)", np.tanh(T)),
     ("tan(pi/4) + sqrt(4) + t - +t", np.full(4, 3.0)),
 ]
 

@@ -31,6 +31,7 @@ FORMS = {
         "-", apply_operation("sin", apply_operation("*", number(3.0), X)), apply_operation("cos", Y)
     ),
     "growth": apply_operation("exp", apply_operation("neg", X)),
+    "knee": apply_operation("tanh", apply_operation("*", TWO, X)),
     "corner": apply_operation(
         "+", apply_operation("abs", X), apply_operation("min", X, apply_operation("max", Y, number(0.5)))
     ),
