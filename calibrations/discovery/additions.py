@@ -133,6 +133,17 @@ def fit_gradually(base: Fit, added: list[Addition], end: Fit | None = None) -> t
     return accepted, fits
 
 
+def fit_one_by_one(base: Fit, added: list[Addition], end: Fit) -> tuple[list[Addition], list[Fit]]:
+    """The additions, and the fits from `base` to that of all of them: one addition more in each.
+
+    Those that increase the error are left out, unless they are needed for the error of the joint fit `end`.
+    """
+    accepted, fits = fit_gradually(base, added, end)
+    if fits[-1].pooled_excess < NO_WORSE * end.pooled_excess:
+        return accepted, fits
+    return added, [base, *fit_successively(base, end, added)]
+
+
 def causes_alone(end: Fit, forms: list[Addition]) -> Fit:
     """The model without the free forms, at its values in the fit with them."""
     model = end.model

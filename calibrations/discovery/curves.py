@@ -7,11 +7,12 @@ belong to bias, scale factor and geometry. The band is the standard uncertainty 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibrations.discovery.findings import Findings
 from calibrations.fitting.fit import Fit
@@ -20,10 +21,12 @@ from calibrations.free_forms.effect import FreeForm
 from calibrations.free_forms.form import CROSS, TILT
 from calibrations.free_forms.place_names import PREFIX, place_of_effect
 from calibrations.geometry.orientation import out_of_plane
-from calibrations.model.chain import forward, static_force
+from calibrations.model.chain import forward, respond, static_force
 from calibrations.table import Array, Table
 
 MOST_POINTS = 48  # of a curve
+MOST_SAMPLES = 4000  # of a record along which a curve is drawn
+STEP = 1e-3  # of a typical parameter: step of a numerical derivative
 NEARLY_ALL = 0.9  # of the variance of a curve: it is even, or odd
 DESCRIBED = 0.8  # of it that an expression must explain to be proposed
 LESS_SIMPLE = 0.02  # of it that a less plain expression must explain beyond a plainer one
@@ -97,24 +100,64 @@ def place_curve(end: Fit, place: str) -> PlaceCurve | None:
     if place == TILT:
         return _turns_over_time(end)
     names = [term.name for term in end.model.terms if place_of_effect(term.name) == place]
-    place_driver = DRIVERS.get(place) or _find_logged_column(place, end.table)
+    place_driver = DRIVERS.get(place) or _find_logged_column(place, end.problem.samples)
     if not names or place_driver is None:
         return None
     driver, driver_unit, factor = place_driver
-    groups = _groups(end, place, driver, factor)
+    rows = _Rows.of(end)
+    groups = _groups(rows, place, driver, factor)
     base = None if factor == "angle" else [_base(driver, factor, x, weight) for _, x, weight in groups.values()]
-    value, std = _contribution(end, names, base)
+    value, std = _contribution(rows, names, base)
     effect_names = [name for name in names if not name.startswith(PREFIX)]
-    explained = _contribution(end, effect_names, base)[0] if effect_names else np.zeros(value.shape)
+    explained = _contribution(rows, effect_names, base)[0] if effect_names else np.zeros(value.shape)
     abscissas, values, bands, parts = {}, {}, {}, {}
-    for axis, (rows, x, weight) in groups.items():
-        averaged = _average_curve(x, weight, value[rows].ravel(), std[rows].ravel(), explained[rows].ravel())
+    for axis, (channels, x, weight) in groups.items():
+        averaged = _average_curve(
+            x, weight, value[channels].ravel(), std[channels].ravel(), explained[channels].ravel()
+        )
         abscissas[axis], values[axis], bands[axis], parts[axis] = averaged
     if not abscissas:
         return None
-    unit = {"": end.problem.unit, "force": f"{end.problem.unit}/g", "angle": "deg"}[factor]
-    driver_unit = driver_unit.replace("{out}", end.problem.unit)
+    unit = {"": end.table.unit, "force": f"{end.table.unit}/g", "angle": "deg"}[factor]
+    driver_unit = driver_unit.replace("{out}", end.table.unit)
     return PlaceCurve(place, driver, driver_unit, unit, abscissas, values, bands, parts)
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """The rows along which a curve is drawn: poses, or samples whose force follows from the outputs or from the motion.
+
+    `force`: what drives the place, g, (n, 3).
+    """
+
+    end: Fit
+    table: Table
+    force: Array
+
+    @staticmethod
+    def of(end: Fit) -> _Rows:
+        """Those of a fitted model; of a long record a part."""
+        if end.table.type.stage_angles:
+            return _Rows(end, end.table, static_force(end.table, end.problem.layout.steps(end.theta)))
+        samples, force = end.problem.samples, end.problem.sensed(end.theta)
+        kept = np.arange(0, samples.n, 1 + samples.n // MOST_SAMPLES)
+        return _Rows(end, samples.rows(kept), force[kept])
+
+    def output(self, theta: Array, without: Sequence[str] = ()) -> Array:
+        """The output of each axis by a model without some of its effects, (channels, n)."""
+        steps = [step for step in self.end.problem.layout.steps(theta) if step[0].name not in without]
+        if self.end.table.type.stage_angles:
+            return forward(self.table, steps).T
+        return respond(self.force, self.table, steps)[:, : len(self.table.axes)].T
+
+    def slope(self, mask: NDArray[np.bool_]) -> Array:
+        """d output / d these parameters, but for its sign, (channels, n, p)."""
+        end = self.end
+        if end.table.type.stage_angles:
+            return end.jacobian[:, :, mask]
+        steps = STEP * end.problem.layout.typical[mask, None] * np.eye(len(end.theta))[mask]
+        changes = [(self.output(end.theta + step) - self.output(end.theta - step)) / (2 * step.sum()) for step in steps]
+        return np.stack(changes, axis=2)
 
 
 def _turns_over_time(end: Fit) -> PlaceCurve | None:
@@ -148,27 +191,25 @@ def _base(driver: str, factor: str, x: Array, weight: Array) -> Array:
     return np.asarray(np.linalg.qr(np.column_stack([np.ones(len(x)), *force]))[0])
 
 
-def _contribution(end: Fit, names: list[str], base: list[Array] | None) -> tuple[Array, Array]:
-    """Contribution of effects to the prediction off the base, and its standard uncertainty, (channels, n)."""
-    steps = end.problem.layout.steps(end.theta)
-    other_steps = [step for step in steps if step[0].name not in names]
-    value = (forward(end.table, steps) - forward(end.table, other_steps)).T
+def _contribution(rows: _Rows, names: list[str], base: list[Array] | None) -> tuple[Array, Array]:
+    """Contribution of effects to the output off the base, and its standard uncertainty, (channels, n)."""
+    end = rows.end
+    value = rows.output(end.theta) - rows.output(end.theta, without=names)
     mask = np.any([end.problem.layout.of_effect(name) for name in names], axis=0)
     cov = covariance(end.information, end.problem.layout.typical)[0][np.ix_(mask, mask)]
-    J = end.jacobian[:, :, mask]
+    J = rows.slope(mask)
     if base is not None:
         value = np.stack([v - Q @ (Q.T @ v) for v, Q in zip(value, base, strict=True)])
         J = np.stack([j - Q @ (Q.T @ j) for j, Q in zip(J, base, strict=True)])
     return value, np.sqrt(np.maximum(np.einsum("cni,ij,cnj->cn", J, cov, J), 0.0))
 
 
-def _groups(end: Fit, place: str, driver: str, factor: str) -> dict[str, tuple[list[int], Array, Array]]:
+def _groups(rows: _Rows, place: str, driver: str, factor: str) -> dict[str, tuple[list[int], Array, Array]]:
     """By axis: channels, driver of the place, and factor of the curve, for all their rows."""
-    table, count = end.table, len(end.table.axes)
-    force = static_force(table, end.problem.layout.steps(end.theta))
+    table, force, count = rows.table, rows.force, len(rows.table.axes)
     if factor == "angle":
         channels = list(range(count))
-        weight = np.concatenate([_by_angle(end, place)[k] for k in channels])
+        weight = np.concatenate([_by_angle(rows.end, place)[k] for k in channels])
         return {place.removeprefix("stage-angle-"): (channels, np.tile(table.column(driver), count), weight)}
     groups = {}
     for k, axis in enumerate(table.axes):

@@ -20,6 +20,7 @@ from calibrations.criteria import (
     MATERIAL,
     MOST_EFFECTS,
     MOST_UNEXPLAINED,
+    MOST_UNSEEN,
     NO_MORE_THAN_NOISE,
 )
 from calibrations.discovery.candidates import candidates, named_first, with_rivals
@@ -41,7 +42,7 @@ from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.determined import explain_undetermined
 from calibrations.fitting.fit import Fit, fit, refit
-from calibrations.free_forms.place_names import is_visible_at_rest, place_of_effect
+from calibrations.free_forms.place_names import KINDS_OF_FORMS, is_visible_at_rest, place_of_effect
 from calibrations.geometry.orientation import one_orientation
 from calibrations.means.noise import correlation_known, neighbours_contradict, rms, with_white
 from calibrations.progress import report
@@ -124,14 +125,19 @@ class RowSearch:
     def _search_model(
         self, start: Fit, outliers: tuple[int, ...], origin: Fit, effects: Mapping[str, Effect]
     ) -> Findings[Fit]:
-        is_motion = self.table.type.moving
-        path = find_path(start, outliers, effects, max_steps=1 if self._shows_places or is_motion else MOST_EFFECTS)
-        if is_motion and find_competing_pattern(path.start, path.end) is None:
+        few_steps = self._shows_places or self._shows_forms
+        path = find_path(start, outliers, effects, max_steps=1 if few_steps else MOST_EFFECTS)
+        if self.table.type.moving:
+            if find_competing_pattern(path.start, path.end) is not None:
+                return self._path_findings(path, effects, origin)
             path = continue_path(path, effects)
         if self._shows_places and (own_names := effects.keys() - catalogue().keys()):
             further = continue_path(path, effects)  # the structural search knows no place for the user's effects
             path = further if own_names & {step.selected.name for step in further.steps} else path
-        if not self._shows_places or _is_explained(path):
+        explained = _is_explained(path)
+        if self._shows_forms and not (explained and path.end.pooled_excess < NO_MORE_THAN_NOISE):
+            return self._findings_without_stages(path, outliers, effects, origin)
+        if not self._shows_places or explained:
             return self._path_findings(path, effects, origin)
         from calibrations.discovery.structural import search_structure  # only this search needs it
 
@@ -142,6 +148,26 @@ class RowSearch:
         if not (findings.steps or path.steps) and structure_of(path.end) is None:
             return self._path_findings(path, effects, origin)  # slow noise looks like a pattern in white noise
         return findings
+
+    def _findings_without_stages(
+        self, path: Path, outliers: tuple[int, ...], effects: Mapping[str, Effect], origin: Fit
+    ) -> Findings[Fit]:
+        """The findings of the search that predicts better: that for places, or the one that adds effects."""
+        if self.table.type.moving and path.end.held_out_excess <= MATERIAL:
+            return self._path_findings(path, effects, origin)
+        from calibrations.discovery.place_search import search_places  # few data need it
+
+        found = search_places(path.start, effects)
+        if found is None or found.end.pooled_excess > MATERIAL:
+            path = continue_path(path, effects)
+        if found is None or not _predicts_better(found.end, path.end):
+            return self._path_findings(path, effects, origin)
+        return self._structural_findings(found, outliers, origin)
+
+    @property
+    def _shows_forms(self) -> bool:
+        """Whether free forms exist for these rows, though no stages gave them their angles."""
+        return self.table.content in KINDS_OF_FORMS and not self.table.type.stage_angles
 
     @property
     def _shows_places(self) -> bool:
@@ -190,7 +216,7 @@ class RowSearch:
             return self.rejected(start, reason)
         pattern = find_competing_pattern(start, end, structural.causes_alone if structural.causes else None)
         remainder = pattern or _material_structure(end)
-        if remainder is None and any(place.unknown for place in structural.structure.places):
+        if remainder is None and any(place.unknown for place in structural.places):
             remainder = structure_of(structural.causes_alone)
         candidate_names = {c.name for c in structural.candidates}
         findings = self._findings(
@@ -200,7 +226,7 @@ class RowSearch:
             candidates=structural.candidates,
             causes=structural.causes,
             alternatives=structural.alternatives,
-            places=structural.structure.places,
+            places=structural.places,
             spoilt=pattern is not None,
             separations=self._separations(
                 {
@@ -276,6 +302,13 @@ def _is_explained(path: Path) -> bool:
     if not as_noise or (np.all(end.noise.white > 0) and neighbours_contradict(end.residual / end.noise.white)):
         return False
     return structure_of(end) is None and is_complete(path)
+
+
+def _predicts_better(places: Fit, effects: Fit) -> bool:
+    """Whether the model with places has the smaller error on unseen rows; of few stretches of motion, a small one."""
+    if places.table.type.moving:
+        return places.held_out_excess < min(effects.held_out_excess, MOST_UNSEEN)
+    return _cross_validated(places) < _cross_validated(effects)
 
 
 def _cross_validated(fit: Fit) -> float:

@@ -228,7 +228,8 @@ def _drop_needless(present: Fit, names: tuple[str, ...], freed: set[str]) -> tup
         costs = {name: cost_of(present, name) for name in removable}
         name = min(costs, key=lambda n: costs[n][0] / max(costs[n][1], 1))
         reduced = _refit_without(present, name)
-        if chance(*costs[name]) < SIGNIFICANT and reduced.held_out_excess > present.held_out_excess:
+        is_needed = chance(*costs[name]) < SIGNIFICANT and reduced.held_out_excess > present.held_out_excess
+        if is_needed or lets_go(present, reduced):
             break
         names = tuple(n for n in names if n != name)
         present = reduced

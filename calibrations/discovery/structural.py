@@ -19,6 +19,7 @@ from calibrations.discovery.additions import (
     at_values_of,
     causes_alone,
     fit_gradually,
+    fit_one_by_one,
     fit_separately,
     fit_successively,
     fit_together,
@@ -35,6 +36,7 @@ from calibrations.fitting.fit import Fit, fit, refit, with_least_white
 from calibrations.fitting.problem_kinds import make_problem
 from calibrations.fitting.requested_forms import BASE, effects_beyond_base
 from calibrations.free_forms.geometry import GEOMETRY, GeometryEffects
+from calibrations.free_forms.naming import ActingPlace
 from calibrations.free_forms.place_names import PREFIX
 from calibrations.free_forms.stairs import before_stairs, find_stairs, fit_stairs, noise_of_rounded
 from calibrations.free_forms.structure import FloorSource, Structure, find_structure, with_stairs
@@ -54,16 +56,19 @@ NEARLY = 1.5  # noise floors: with a larger error, the stairs are wrong
 class StructuralSearch:
     """The end of a search: the given model, the steps beyond it, and the places that act.
 
+    `named`: effects of the catalogue that are causes; `rivals`: by cause, what the data cannot separate from it.
     `candidates`: every effect of the catalogue alone on top of the given model.
     `causes_alone`: the last model without its free forms.
     """
 
     start: Fit
     steps: tuple[Step[Fit], ...]
-    structure: Structure
+    places: tuple[ActingPlace, ...]
+    named: tuple[str, ...]
+    rivals: Mapping[str, tuple[str, ...]]
     candidates: tuple[RowCandidate, ...]
     causes_alone: Fit
-    remarks: tuple[str, ...]
+    remarks: tuple[str, ...] = ()
 
     @property
     def end(self) -> Fit:
@@ -74,12 +79,12 @@ class StructuralSearch:
     def causes(self) -> tuple[str, ...]:
         """Effects of the steps that are causes."""
         names = {step.name for step in self.steps}
-        return tuple(cause for cause in self.structure.causes if cause in names)
+        return tuple(cause for cause in self.named if cause in names)
 
     @property
     def alternatives(self) -> dict[str, tuple[str, ...]]:
         """By cause, the effects that the data cannot separate from it."""
-        rivals_by_cause = {name: self.structure.alternatives.get(name, ()) for name in self.causes}
+        rivals_by_cause = {name: self.rivals.get(name, ()) for name in self.causes}
         if self.candidates and self.causes == (self.candidates[0].name,):
             name, rivals_alone = self.candidates[0].name, self.candidates[0].indistinguishable_from
             rivals_by_cause[name] = tuple(dict.fromkeys([*rivals_by_cause[name], *rivals_alone]))
@@ -103,12 +108,15 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
     selected, fits = _fit_each_addition(base, best, renew=needed != basic)
     if floor is not None and stated_white is not None:
         fits[-1] = with_least_white(fits[-1], stated_white)
-    steps = _steps(start, needed, base, effects)
+    steps = steps_to(start, needed, base, effects)
     steps += [Step(a.effect.name, *pair) for a, pair in zip(selected, pairwise(fits), strict=True)]
     report("testing each effect alone")
-    ranked = _first(start, steps, candidates(start, effects))
+    ranked = first_candidates(start, steps, candidates(start, effects))
     forms = [a for a in selected if a.effect.name.startswith(PREFIX)]
-    return StructuralSearch(start, tuple(steps), best.structure, ranked, causes_alone(fits[-1], forms), remarks)
+    found, without_forms = best.structure, causes_alone(fits[-1], forms)
+    return StructuralSearch(
+        start, tuple(steps), found.places, found.causes, found.alternatives, ranked, without_forms, remarks
+    )
 
 
 def _best_structure(base: Fit, effects: Mapping[str, Effect]) -> tuple[Fit, _StructureFit, FloorSource | None]:
@@ -141,11 +149,7 @@ def _fit_each_addition(base: Fit, best: _StructureFit, renew: bool) -> tuple[lis
     selected = [*causes, *at_values_of(end, best.forms)]
     if renew:
         end = fit_together(base, selected)
-    accepted, fits = fit_gradually(base, selected, end)
-    if fits[-1].pooled_excess < NO_WORSE * end.pooled_excess:
-        selected = accepted
-    else:
-        fits = [base, *fit_successively(base, end, selected)]
+    selected, fits = fit_one_by_one(base, selected, end)
     return _without_idle_additions(selected, fits, best.structure.causes)
 
 
@@ -286,13 +290,13 @@ def _fit_each_axis(start: Fit, names: list[str], effects: Mapping[str, Effect]) 
     return refit(start, model) if names else start
 
 
-def _steps(start: Fit, names: list[str], base: Fit, effects: Mapping[str, Effect]) -> list[Step[Fit]]:
+def steps_to(start: Fit, names: list[str], base: Fit, effects: Mapping[str, Effect]) -> list[Step[Fit]]:
     """A step for each effect that was freed; the last ends at `base`."""
     fits = [start, *(_fit_each_axis(start, names[: k + 1], effects) for k in range(len(names) - 1)), base]
     return [Step(name, *pair) for name, pair in zip(names, pairwise(fits[: len(names) + 1]), strict=True)]
 
 
-def _first(start: Fit, steps: list[Step[Fit]], ranked: list[RowCandidate]) -> tuple[RowCandidate, ...]:
+def first_candidates(start: Fit, steps: list[Step[Fit]], ranked: list[RowCandidate]) -> tuple[RowCandidate, ...]:
     """The candidates on the given model, those of the steps first, the first one with the errors of its full fit.
 
     A single cause has the rivals of the search that adds effects; several causes have none here.

@@ -24,10 +24,12 @@ from calibrations.fitting.fit import Fit
 from calibrations.fitting.identifiability import UNDETERMINED, covariance
 from calibrations.fitting.problem_kinds import make_problem
 from calibrations.geometry.sphere import magnetometer_coverage_warning
+from calibrations.means.noise import rms
 from calibrations.model.parameters import Layout
 from calibrations.table import Array
 
 ROUNDING = 1e-9  # of a leverage
+LEAST_SPREAD = 0.1  # of that of another model: positions then have one orientation
 
 
 def leverages(fit: Fit) -> Array:
@@ -78,12 +80,20 @@ def _warn_of_unchecked_rows(fit: Fit, lone: NDArray[np.bool_]) -> str:
 def lets_go(smaller: Fit, larger: Fit) -> bool:
     """Whether a parameter that `smaller` determines is undetermined in `larger`: for positions of unknown orientation.
 
-    With enough nonlinearity, a model can give every output the same magnitude; the parameters then mean nothing.
+    With enough nonlinearity, or with a far too large scale factor, a model can give every output the same magnitude;
+    the parameters then mean nothing.
     """
     if not larger.table.type.magnitude:
         return False
+    if _spread_of_sensed(larger) < LEAST_SPREAD * _spread_of_sensed(smaller):
+        return True
     identified = {key for key, e in smaller.params.items() if e.identified}
     return any(key in identified and not e.identified for key, e in larger.params.items())
+
+
+def _spread_of_sensed(fit: Fit) -> float:
+    """Rms of the sensed quantity about its mean, by the model."""
+    return float(rms(np.std(fit.problem.sensed(fit.theta), axis=0)))
 
 
 def blind_to(fit: Fit, effects: Mapping[str, Effect]) -> tuple[str, ...]:

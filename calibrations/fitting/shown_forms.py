@@ -7,7 +7,7 @@ them, and the sizes follow as those of poses do.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -23,7 +23,7 @@ from calibrations.free_forms.form import CROSS, Factor, Form
 from calibrations.free_forms.places import DEGREE, THRESHOLDS_G
 from calibrations.free_forms.places_in_time import AGES
 from calibrations.free_forms.reml import Gram, Sizes, eliminate_base, estimate, gains, scale_components
-from calibrations.free_forms.selection import ENTER, select
+from calibrations.free_forms.selection import ENTER, pools_of, select
 from calibrations.free_forms.structure import with_size
 from calibrations.geometry.orientation import out_of_plane
 from calibrations.table import Array, Table
@@ -53,6 +53,7 @@ class Shown:
 
     columns  whitened [base, forms, residual], (rows, base + forms + 1)
     apart    an effect of the model whose parameters are no part of the base
+    scatter  standard deviation of the rows without forms, in that of the fit's noise
     """
 
     fit: Solution
@@ -60,9 +61,10 @@ class Shown:
     gram: Gram
     columns: Array
     apart: str = ""
+    scatter: float = 1.0
 
     @staticmethod
-    def of(fit: Solution, forms: Mapping[str, Form], apart: str = "") -> Shown:
+    def of(fit: Solution, forms: Mapping[str, Form], apart: str = "", scatter: float = 1.0) -> Shown:
         """The forms by name and one effect (`apart`), tested together with the other parameters of a fit."""
         J, own = fit.whitened[:, 1:], fit.problem.layout.of_effect(apart)
         parts = {name: fit.noise.whiten(form_columns(fit, form)) for name, form in forms.items()}
@@ -70,21 +72,38 @@ class Shown:
         ends = np.cumsum([0, *(part.shape[1] for part in parts.values())])
         blocks = {name: slice(int(a), int(b)) for name, a, b in zip(parts, ends[:-1], ends[1:], strict=True)}
         left = fit.whitened[:, 0] - J[:, own] @ fit.theta[own]
-        X = np.hstack([J[:, ~own], *parts.values(), left[:, None]])
+        X = np.hstack([J[:, ~own], *parts.values(), left[:, None]]) / scatter
         g = _gram(fit, X, ~own, blocks, dict.fromkeys(blocks, 1.0))
         X, scales = scale_components(X, g, int(np.sum(~own)))
-        return Shown(fit, forms, _gram(fit, X, ~own, blocks, scales), X, apart)
+        return Shown(fit, forms, _gram(fit, X, ~own, blocks, scales), X, apart, scatter)
+
+    @cached_property
+    def components(self) -> Mapping[str, Component]:
+        """The forms as components of a search, by name."""
+        return {name: _component(name, form) for name, form in self.forms.items()}
 
     @cached_property
     def selected(self) -> Sizes:
         """The forms that act, and their sizes."""
-        components = [_component(name, form) for name, form in self.forms.items()]
-        return select(self.gram, self.without_forms, components, [{c.name: c for c in components}], {}, ENTER, True)
+        components = list(self.components.values())
+        return select(self.gram, self.without_forms, components, pools_of(components, False), {}, ENTER, True)
+
+    def add(self, names: Iterable[str], sizes: Sizes) -> Sizes:
+        """The sizes with those of the forms `names` that act as well."""
+        pool = {name: self.components[name] for name in names}
+        return select(self.gram, sizes, list(self.components.values()), [pool], {}, ENTER, False)
 
     @property
     def without_forms(self) -> Sizes:
         """The sizes of all forms set to zero."""
         return estimate(self.gram, {}, {})
+
+    def excess(self, sizes: Sizes) -> float:
+        """The rms of what forms of these sizes leave of the residual, over the noise of `scatter`."""
+        g, u, rows = self.gram, sizes.coefficients, self.gram.indices(sizes.variances)
+        squares = g.squares - 2 * float(u @ g.with_data[rows]) + float(u @ g.products[np.ix_(rows, rows)] @ u)
+        used = g.base_rank + len(u) - sum(sizes.shrinkage(g, name) for name in sizes.variances)
+        return float(np.sqrt(max(squares, 0.0) / max(g.rows - used, 1.0)))
 
     def gain_apart(self, sizes: Sizes) -> float:
         """Twice the gain in log-likelihood by the effect, with forms of these sizes in the model."""

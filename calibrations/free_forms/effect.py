@@ -15,7 +15,7 @@ from pydantic import TypeAdapter
 from calibrations.effects import Effect, Parameter, Values
 from calibrations.errors import ModelError, nearest
 from calibrations.free_forms.form import ANGLES, TILT, TURNED, Form
-from calibrations.free_forms.place_names import EFFECTS_AT, GEOMETRY_PLACE, PLACES, PREFIX
+from calibrations.free_forms.place_names import EFFECTS_AT, GEOMETRY_PLACE, KINDS_OF_FORMS, PLACES, PREFIX
 from calibrations.geometry.orientation import Pose, reported_force
 from calibrations.table import AXES, Array, Table
 
@@ -97,7 +97,7 @@ class FreeForm(Effect):
     Source    Wood (2017), 5.8; Patterson and Thompson (1971).
     """
 
-    kinds = ("poses", "positions", "motion")
+    kinds = KINDS_OF_FORMS
 
     def __init__(self, forms: tuple[Form, ...]) -> None:
         """Parameters are the coefficients of each form's columns, with the form's size as their prior."""

@@ -18,6 +18,12 @@ LOGGED_DEG = 5.0  # approach of a pose whose side is taken from the column `dire
 SIDES = {0.0: "moved", LOGGED_DEG: "logged", STATED_APPROACH: "stated"}  # names of sides by the length of the approach
 
 
+def logged_columns(table: Table) -> list[str]:
+    """The logged columns that change, without those that have a place or a meaning of their own."""
+    of_outputs = {*table.output_names, *table.std_names, *(f"{name}_of_mean" for name in table.std_names)}
+    return sorted(name for name in set(table.columns) - USED - of_outputs if np.ptp(table.column(name)) > 0)
+
+
 @dataclass(frozen=True, eq=False)
 class PoseData:
     """A table of poses with the rows in order of time. Angles in rad, (n,); outputs in the table's unit, (channels, n).
@@ -41,8 +47,6 @@ class PoseData:
     def of(table: Table) -> PoseData:
         """The data of a table in order of time."""
         spreads = table.std_names
-        mean_names = {f"{name}_of_mean" for name in spreads}
-        others_logged = set(table.columns) - USED - set(table.output_names) - set(spreads) - mean_names
         return PoseData(
             table=table,
             alpha=np.radians(table.column("alpha_deg")),
@@ -52,7 +56,7 @@ class PoseData:
             outputs=table.outputs.T.copy(),
             sides=_sides(table),
             spread=np.stack([table.column(name) for name in spreads]) if all(s in table for s in spreads) else None,
-            logged={name: table.column(name) for name in sorted(others_logged) if np.ptp(table.column(name)) > 0},
+            logged={name: table.column(name) for name in logged_columns(table)},
         )
 
     @property

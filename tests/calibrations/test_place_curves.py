@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibrations.discovery.curves import place_curve, place_curves
+from calibrations.discovery.curves import PlaceCurve, _shapes, _variable, place_curve, place_curves
 from calibrations.discovery.rows import Rows
 from calibrations.discovery.summary import certainty_text, step_shares, summary_lines
 from calibrations.effects.catalogue import catalogue
+from calibrations.effects.expression import parse
 from calibrations.free_forms.requested import resolve_effect
 from calibrations.loop import discover
 from calibrations.model.file import read_model
@@ -46,6 +47,25 @@ def test_an_expression_is_proposed_that_has_the_form_of_the_curve(
     assert curve is not None
     assert curve.expression is not None
     assert curve.expression.replace("vy", "vx").replace("ax", "ay") == expression
+
+
+@pytest.mark.parametrize(
+    ("place", "driver", "unit"),
+    [
+        ("own-response", "own force", "V"),
+        ("temperature-scale", "temperature_c", "V/g"),
+        ("time-bias", "t_s", "V"),
+        ("stage-angle-beta", "beta_deg", "deg"),
+    ],
+)
+def test_every_expression_that_can_be_proposed_can_be_read(place: str, driver: str, unit: str) -> None:
+    x = np.linspace(0.0, 10.0, 24)
+    none = {"x": np.zeros(24)}
+    curve = PlaceCurve(place, driver, "", unit, {"x": x}, none, none, none)
+    shapes = [text for _, text in _shapes(curve, x, _variable(driver, "x") or "")]
+    assert len(shapes) > 5
+    for text in shapes:
+        assert parse(f"v += {text}").names
 
 
 def test_harmonics_of_the_stage_are_counted() -> None:

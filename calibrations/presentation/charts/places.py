@@ -14,9 +14,9 @@ from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import CalibrationError
 from calibrations.fitting.fit import Fit, fit
-from calibrations.free_forms.place_names import EFFECTS_AT, PREFIX, place_of_effect
+from calibrations.free_forms.place_names import EFFECTS_AT, KINDS_OF_FORMS, PREFIX, place_of_effect
 from calibrations.model import Model
-from calibrations.model.chain import forward
+from calibrations.model.chain import forward, respond
 from calibrations.presentation.chart import (
     AMBER,
     BAND,
@@ -88,7 +88,7 @@ def place_pictures(steps: Falling) -> list[Picture]:
 
 def model_curves(end: Fit) -> list[PlaceCurve]:
     """The curve of each place at which the model has an effect, the largest first."""
-    if end.table.content != "poses":
+    if end.table.content not in KINDS_OF_FORMS:
         return []
     places = dict.fromkeys(place_of_effect(term.name) for term in end.model.terms)
     curves = [curve for place in places if place and (curve := place_curve(end, place)) is not None]
@@ -98,13 +98,19 @@ def model_curves(end: Fit) -> list[PlaceCurve]:
 def forms_through(end: Fit, curve: PlaceCurve) -> list[FittedForm]:
     """Forms of the catalogue fitted to the curve of unknown form at a place, the best first; none without such a curve.
 
-    They are fitted to what bias, scale factor and this place predict, without noise.
+    They are fitted to what bias, scale factor and this place predict, without noise; not to motion, whose output passes
+    a filter.
     """
-    if not end.model.holds(f"{PREFIX}{curve.place}"):
+    if not end.model.holds(f"{PREFIX}{curve.place}") or end.table.type.moving:
         return []
     steps = end.problem.layout.steps(end.theta)
     steps_of_place = [step for step in steps if step[0].name in BASE or place_of_effect(step[0].name) == curve.place]
-    predicted = forward(end.table, steps_of_place)
+    known_pose = end.table.type.stage_angles
+    predicted = (
+        forward(end.table, steps_of_place)
+        if known_pose
+        else respond(end.problem.sensed(end.theta), end.table, steps_of_place)
+    )
     outputs = dict(zip(end.table.output_names, predicted.T, strict=True))
     table = replace(end.table, columns={**end.table.columns, **outputs})
     table = table.rows(np.arange(0, table.n, max(1, table.n // MOST_ROWS)))  # without noise, a part of the poses does

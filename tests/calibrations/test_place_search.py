@@ -1,0 +1,122 @@
+"""The search for places in positions and motion: what acts there, whether or not the catalogue has its form."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from calibrations.discovery.curves import place_curves
+from calibrations.discovery.results import Discovery
+from calibrations.discovery.verdict import Verdict
+from calibrations.documents import places_document
+from calibrations.fitting.fit import Fit
+from calibrations.loop import discover
+from calibrations.model.file import read_model
+from calibrations.presentation.charts.places import place_pictures
+from calibrations.table import Array, Table
+from tests.benchmark.shaking import Mechanism, measured
+from tests.calibrations.hand_held import SHARES, Held, N
+
+SEEDS = (1, 2)
+UNKNOWN_CURVES: dict[str, Callable[[Held], Array]] = {
+    "cross-response": lambda held: 2e-3 * np.sin(4 * held.up[:, [1, 0, 0]]) * SHARES,
+    "own-response": lambda held: 3e-3 * np.tanh((held.up - 0.4) / 0.1) * SHARES,
+    "z-response": lambda held: 2e-3 * np.tanh(3 * held.up[:, [2, 2, 1]]) ** 2 * SHARES,
+    "temperature-scale": lambda held: 2e-3 * np.sin(held.temperature_c - 25)[:, None] * held.up,
+    "time-bias": lambda held: 2e-3 * np.sin(held.t_s / 100)[:, None] * SHARES,
+}
+
+
+def discovered(data: Table) -> Discovery[Fit]:
+    return discover(data, read_model("linear"))
+
+
+def quadratic(held: Held) -> Array:
+    return np.asarray(3e-3 * held.up**2 * SHARES)
+
+
+def warming(held: Held, bend: float = 0.0) -> Array:
+    u = (held.temperature_c - 25) / 5
+    return np.asarray(1.5e-3 * (u + bend * u**2)[:, None] * SHARES)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("place", UNKNOWN_CURVES)
+def test_an_unknown_cause_has_its_place_and_no_name(place: str, seed: int) -> None:
+    held = Held(seed)
+    found = discovered(held.table(UNKNOWN_CURVES[place](held)))
+    assert found.verdict is Verdict.UNEXPLAINED
+    assert found.causes == ()
+    assert [acting.name for acting in found.findings.places] == [place]
+    assert found.end.held_out_excess < 1.5 < found.start.held_out_excess
+
+
+def test_the_curve_of_a_place_is_the_function_that_acts_within_its_band() -> None:
+    held = Held(1)
+    found = discovered(held.table(UNKNOWN_CURVES["cross-response"](held)))
+    curve = place_curves(found.findings)["cross-response"]
+    assert (curve.driver, curve.unit) == ("force along the other axis", "g")
+    x = held.up[:, 1]
+    line = np.polyfit(x, 2e-3 * np.sin(4 * x), 1)  # linear parts belong to the geometry
+    true = 2e-3 * np.sin(4 * curve.at["x"]) - np.polyval(line, curve.at["x"])
+    assert np.mean(np.abs(curve.value["x"] - true) < 3 * curve.std["x"]) > 0.9
+    assert np.max(np.abs(curve.value["x"] - true)) < 0.15 * np.ptp(true)
+    (document,) = places_document(found)
+    assert document["place"] == "cross-response"
+    assert document["curve"]["unit"] == "g"
+    assert [picture.name for picture in place_pictures(found)] == ["shares", "place-cross-response"]
+
+
+def test_effects_of_the_catalogue_leave_no_form() -> None:
+    held = Held(1)
+    found = discovered(held.table(quadratic(held) + warming(held)))
+    assert set(found.causes) == {"quadratic-nonlinearity", "temperature-bias"}
+    assert {step.name for step in found.steps} == set(found.causes)
+    assert found.end.pooled_excess < 1.1
+
+
+def test_a_cause_in_another_form_keeps_its_curve() -> None:
+    held = Held(1)
+    found = discovered(held.table(warming(held, bend=0.4)))
+    assert found.causes == ("temperature-bias",)
+    assert [step.name for step in found.steps] == ["temperature-bias", "free:temperature-bias"]
+
+
+def test_geometry_is_named_beside_a_cause() -> None:
+    held = Held(1)
+    turned = 3e-3 * held.up[:, [1, 0, 1]] * [1.0, -1.0, 0.5]
+    found = discovered(held.table(turned + 3e-3 * held.up**3 * SHARES))
+    assert set(found.causes) == {"cubic-nonlinearity", "axis-nonorthogonality"}
+
+
+def test_the_scatter_of_the_hand_has_no_place() -> None:
+    for seed in range(2):
+        found = discovered(Held(seed).table(scatter=3.0))
+        assert (found.causes, found.steps, found.findings.places) == ((), (), ())
+
+
+def test_the_order_of_rows_changes_no_place() -> None:
+    held = Held(2)
+    data = held.table(UNKNOWN_CURVES["own-response"](held))
+    shuffled = data.rows(np.random.default_rng(0).permutation(N))
+    ends = [discovered(table).end for table in (data, shuffled)]
+    assert ends[0].model.effects == ends[1].model.effects
+    assert ends[0].pooled_excess == pytest.approx(ends[1].pooled_excess, rel=1e-6)
+
+
+def test_a_place_that_is_left_out_is_not_found() -> None:
+    held = Held(1)
+    data = held.table(UNKNOWN_CURVES["cross-response"](held))
+    found = discover(data, read_model("linear"), without=["cross-response"])
+    assert "cross-response" not in [place.name for place in found.findings.places]
+
+
+@pytest.mark.slow
+def test_a_cause_of_a_motion_has_its_place() -> None:
+    curve = Mechanism("", 1e-3, response=lambda s, size: size * np.sin(4 * s.other + 1) * [1.0, -0.6])
+    found = discovered(measured(((curve, 4e-3),), "three lines", 1))
+    assert [place.name for place in found.findings.places] == ["cross-response"]
+    assert found.end.held_out_excess < 1.3
+    assert "cross-response" in place_curves(found.findings)
