@@ -314,9 +314,9 @@ class Record:
             options = connection.execution_options(yield_per=32)
             for row in options.execute(query.order_by(poses.c.number)):
                 excluded.discard(row.number)
-                damaged = any(is_damaged(table, row._mapping, required) for table in (poses, blocks))
-                if row.excluded is None or not damaged:
-                    yield kept_of(require_sound(row, poses, blocks, required=required))
+                if row.excluded is not None and any(is_damaged(t, row._mapping, required) for t in (poses, blocks)):
+                    continue
+                yield kept_of(require_sound(row, poses, blocks, required=required))
             for number in sorted(excluded):
                 raise lost_pose_error(run, number)
 
