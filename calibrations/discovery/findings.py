@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
 from calibrations.criteria import LIKELY, NOTEWORTHY
 from calibrations.discovery.verdict import Closest, Evidence, Judgement
 from calibrations.effects import Effect
+from calibrations.free_forms.place_names import PREFIX
 from calibrations.model import Model
 
 if TYPE_CHECKING:
@@ -185,6 +186,12 @@ class Findings(Evidence, Generic[F]):
         return tuple(name for name in self.names if name not in self.causes)
 
     @property
+    def curves(self) -> tuple[str, ...]:
+        """Free forms of the steps at places of unknown cause: what acts there, and not the form of a cause."""
+        forms = {f"{PREFIX}{place.name}" for place in self.places if place.unknown}
+        return tuple(name for name in self.names if name in forms)
+
+    @property
     def end(self) -> F:
         """The fit of the final model."""
         return self.steps[-1].after if self.steps else self.baseline
@@ -200,7 +207,8 @@ class Findings(Evidence, Generic[F]):
     @cached_property
     def final(self) -> Judgement:
         """The judgement on the final model."""
-        return replace(self._judge(self.start, self.causes, self.undetermined[1]), refinements=self.refinements)
+        refinements = tuple(name for name in self.refinements if name not in self.curves)
+        return replace(self._judge(self.start, self.causes, self.undetermined[1]), refinements=refinements)
 
     def _judge(self, fit: F, added: tuple[str, ...], undetermined: str | None) -> Judgement:
         """The judgement on the model of `fit`, with the effects that were added to it."""
@@ -220,7 +228,7 @@ class Findings(Evidence, Generic[F]):
     def _missing(self) -> tuple[str, ...]:
         """The effects of the steps. A curve at an unknown place has the name of its place."""
         unknown = any(place.unknown for place in self.places)
-        return tuple(name for name in self.names if not (unknown and name.startswith("free:")))
+        return tuple(name for name in self.names if not (unknown and name.startswith(PREFIX)))
 
     @property
     def _closest(self) -> Closest | None:

@@ -34,7 +34,7 @@ from calibrations.free_forms.poses import logged_columns
 from calibrations.free_forms.reml import Sizes, estimate
 from calibrations.free_forms.requested import DRIVERS, RequestedForm, shortage
 from calibrations.free_forms.rivals import CLOSE
-from calibrations.free_forms.selection import prices
+from calibrations.free_forms.selection import ENTER, prices
 from calibrations.means.noise import rms
 from calibrations.model import Model
 from calibrations.model.chain import respond
@@ -68,7 +68,7 @@ def search_places(start: Fit, effects: Mapping[str, Effect]) -> StructuralSearch
     if acting is None or not acting.by_place:
         return None
     present = refit(base, reduce(Model.with_effect, acting.effects, base.model))
-    if not _score(present) > _score(start) + PATTERN_BETTER:
+    if lets_go(start, present) or not _score(present) > _score(start) + PATTERN_BETTER:
         return None  # slow noise, or scatter, explains the residual as well
     report("fitting the effects and curves that were found")
     places = [_Place(name, acting.gain(name), rivals=tuple(acting.rivals(name))) for name in acting.by_place]
@@ -100,8 +100,17 @@ class _ActingForms:
         return [free_form(tuple(self.shown.sized(n, self.sizes) for n in names)) for names in self.by_place.values()]
 
     def gain(self, place: str) -> float:
-        """What the forms of a place together gain of -2 log likelihood."""
-        return self._without(place).deviance - self.sizes.deviance
+        """What the forms of a place together gain of -2 log likelihood, less their price."""
+        gained = self.shown.deviance(self._without(place)) - self.shown.deviance(self.sizes)
+        return gained - prices([self.shown.components[name] for name in self.by_place[place]])
+
+    @property
+    def significant(self) -> _ActingForms:
+        """The same without places whose gain is chance in the uncertain scatter of the rows, the weakest first."""
+        weakest = min(self.by_place, key=self.gain, default=None)
+        if weakest is None or self.gain(weakest) > ENTER:
+            return self
+        return replace(self, sizes=self._without(weakest)).significant
 
     def rivals(self, place: str) -> dict[str, Sizes]:
         """Other places whose forms explain as well what those of a place explain, and the sizes with them instead."""
@@ -146,21 +155,20 @@ def _fit_with_linear_effects(start: Fit, effects: Mapping[str, Effect]) -> Fit:
 def _possible_places(fit: Fit) -> list[str]:
     """The places of which these rows can show a free form, without those that the model has."""
     columns = [f"column:{name}" for name in ("std", "supply_v", *logged_columns(fit.table)) if name not in OF_MOTION]
-    taken = {*fit.table.left_out, *(place_of_effect(term.name) for term in fit.model.terms)}
-    return [name for name in (*DRIVERS, *columns) if name not in taken and shortage(name, fit.table) is None]
+    possible = [name for name in (*DRIVERS, *columns) if shortage(name, fit.table) is None]
+    return [name for name in possible if name not in fit.table.left_out and not fit.model.holds(f"{PREFIX}{name}")]
 
 
 def _acting_forms(fit: Fit, places: Iterable[str]) -> _ActingForms:
     """The forms of these places that act, in noise with the scatter that they leave; at least that of the samples."""
     forms = {name: form for place in places for name, form in forms_at(place, fit).items()}
-    scatter = 1.0
+    scatter, least = 1.0, 1.0 if fit.problem.white is not None else 0.0
     for _ in range(ROUNDS):
         shown = Shown.of(fit.in_white_noise(), forms, scatter=scatter)
-        excess = shown.excess(shown.selected)
-        if excess < SETTLED or not shown.selected.variances:
+        settled, scatter = scatter, max(least, scatter * shown.excess(shown.selected))
+        if max(scatter / settled, settled / scatter) < SETTLED or not shown.selected.variances:
             break
-        scatter *= excess
-    return _ActingForms(shown, shown.selected)
+    return _ActingForms(shown, shown.selected).significant
 
 
 def _score(fit: Fit) -> float:

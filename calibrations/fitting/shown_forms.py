@@ -105,6 +105,19 @@ class Shown:
         used = g.base_rank + len(u) - sum(sizes.shrinkage(g, name) for name in sizes.variances)
         return float(np.sqrt(max(squares, 0.0) / max(g.rows - used, 1.0)))
 
+    def deviance(self, sizes: Sizes) -> float:
+        """-2 log restricted likelihood with forms of these sizes, in the likeliest scatter of the rows.
+
+        The scatter is no smaller than the noise of the rows, where that is known. Few rows leave it uncertain: a form
+        that takes up many of them gains less than in a scatter that were known.
+        """
+        g = self.gram
+        quadratic = g.squares - float(g.with_data[g.indices(sizes.variances)] @ sizes.coefficients)
+        free_rows = g.rows - g.base_rank
+        least = self.scatter**-2 if self.fit.problem.white is not None else 0.0
+        variance = max(quadratic / free_rows, least)
+        return quadratic / variance + free_rows * float(np.log(variance)) + sizes.deviance - quadratic
+
     def gain_apart(self, sizes: Sizes) -> float:
         """Twice the gain in log-likelihood by the effect, with forms of these sizes in the model."""
         return gains(self.gram, sizes, [self.apart])[self.apart][0]

@@ -68,7 +68,7 @@ def load_request(request: Request, notify: Tell) -> AnalysisInput:
 
 
 def loaded_table(request: Request, notify: Tell) -> tuple[Table, Model, Mapping[str, Effect]]:
-    """As `loaded`, for questions that only a table of rows can answer."""
+    """As `load_request`, for questions that only a table of rows can answer."""
     effects = effects_of(request.bench_file)
     rows = _rows(request, effects, notify)
     model = read_model(request.model or rows.default_model, effects)

@@ -11,6 +11,7 @@ from calibrations.discovery.curves import place_curves
 from calibrations.discovery.results import Discovery
 from calibrations.discovery.verdict import Verdict
 from calibrations.documents import places_document
+from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit
 from calibrations.loop import discover
 from calibrations.model.file import read_model
@@ -75,6 +76,16 @@ def test_effects_of_the_catalogue_leave_no_form() -> None:
     assert set(found.causes) == {"quadratic-nonlinearity", "temperature-bias"}
     assert {step.name for step in found.steps} == set(found.causes)
     assert found.end.pooled_excess < 1.1
+
+
+def test_what_a_model_has_already_is_not_found_again() -> None:
+    held = Held(1)
+    data = held.table(quadratic(held) + UNKNOWN_CURVES["cross-response"](held))
+    model = read_model("linear").with_effect(catalogue()["quadratic-nonlinearity"])
+    found = discover(data, model)
+    assert [step.name for step in found.steps] == ["free:cross-response"]
+    again = discover(data, found.end.model)
+    assert (again.verdict, again.steps) == (Verdict.ADEQUATE, ())
 
 
 def test_a_cause_in_another_form_keeps_its_curve() -> None:

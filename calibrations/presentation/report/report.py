@@ -53,8 +53,8 @@ def _error(discovery: Discovery[Fit]) -> str:
         f"the noise floor is {rounded(floor, 2)} {unit}. The held-out error falls from "
         f"{rounded(start.held_out_excess)} to {rounded(discovery.steps[-1].held_out_after)} × the noise floor."
     )
-    if discovery.refinements:
-        text += f" For the form of these effects the model also holds {join_words(discovery.refinements)}."
+    if refinements := discovery.judgement.refinements:
+        text += f" For the form of these effects the model also holds {join_words(refinements)}."
     return text + pattern
 
 
@@ -205,7 +205,8 @@ def _steps(discovery: Discovery[Fit]) -> Table:
         )
     ]
     for step in discovery.steps:
-        part = "cause" if step.name in discovery.causes else "refines the form of a cause"
+        curve = "unknown cause" if step.name in discovery.findings.curves else "refines the form of a cause"
+        part = "cause" if step.name in discovery.causes else curve
         excess, held_out = rounded(step.after.pooled_excess), rounded(step.held_out_after)
         rows.append((f"+ {step.name}", error_text(step.after), excess, held_out, part))
     head = ("model", "rms error", "error / floor", "held-out error / floor", "part")
