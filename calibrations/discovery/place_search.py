@@ -177,8 +177,10 @@ def _score(fit: Fit) -> float:
     return likelihood - fit.effective_parameters * float(np.log(fit.residual.size))
 
 
-def _squares(fit: Fit) -> float:
-    """Sum of squares of the residual, in the white noise of the rows."""
+def _squares(fit: Fit, present: Fit) -> float:
+    """Sum of squares of the residual, in the white noise of the rows or, if none is known, in the residual of `present`."""
+    if fit.problem.white is None:
+        return float(np.sum((fit.residual / present.rmse[:, None]) ** 2))
     return float(np.sum(fit.in_white_noise().whitened[:, 0] ** 2))
 
 
@@ -189,7 +191,7 @@ def _name(place: _Place, present: Fit, effects: Mapping[str, Effect]) -> tuple[F
     form is needed beside them: together they follow nearly any curve.
     """
     without = refit(present, present.model.without(f"{PREFIX}{place.name}"))
-    curve = _squares(without) - _squares(present)
+    curve = _squares(without, present) - _squares(present, present)
     chosen: list[tuple[RowCandidate, Fit]] = []
     rivals: dict[str, tuple[str, ...]] = {}
     while len(chosen) < MOST_NAMES:
@@ -202,18 +204,19 @@ def _name(place: _Place, present: Fit, effects: Mapping[str, Effect]) -> tuple[F
         trials = [(c, trial) for c, trial in trials if not lets_go(best, trial)]
         complete = [(c, trial) for c, trial in trials if _is_complete(trial, present, place.name)]
         if complete:
-            last, end = _likeliest(complete)
+            last, end = _likeliest(complete, present)
             causes = (*(c.name for c, _ in chosen), last.name)
             rivals[last.name] = with_rivals(last, ranked, best).indistinguishable_from
             return end, replace(place, causes=causes, share=1.0, rivals=(), rivals_of_causes=rivals)
         at_place = [(c, trial) for c, trial in trials if place_of_effect(c.name) == place.name]
         least = (NEXT_FORM if chosen else FIRST_FORM) * curve
-        at_place = [(c, trial) for c, trial in at_place if _squares(best) - _squares(trial) >= least]
+        before = _squares(best, present)
+        at_place = [(c, trial) for c, trial in at_place if before - _squares(trial, present) >= least]
         if not at_place:
             break
-        chosen.append(_likeliest(at_place, NEXT_FORM * curve))
+        chosen.append(_likeliest(at_place, present, NEXT_FORM * curve))
         rivals[chosen[-1][0].name] = place.rivals
-    share = (_squares(without) - _squares(chosen[0][1])) / curve if chosen else 0.0
+    share = (_squares(without, present) - _squares(chosen[0][1], present)) / curve if chosen else 0.0
     if share < NAMED:
         return present, place
     cause, beside = chosen[0]
@@ -234,14 +237,16 @@ def _worth_a_fit(ranked: Sequence[RowCandidate], place: str) -> list[RowCandidat
 
 def _is_complete(trial: Fit, with_form: Fit, place: str) -> bool:
     """Whether a fit is as good as that with the form of this place, and the rows show no such form beside it."""
-    as_good = trial.pooled_excess < MATERIAL * max(1.0, with_form.pooled_excess)
-    return as_good and not _acting_forms(trial, [place]).by_place
+    most = MATERIAL**2 * max(float(trial.residual.size), _squares(with_form, with_form))
+    return _squares(trial, with_form) < most and not _acting_forms(trial, [place]).by_place
 
 
-def _likeliest(trials: Sequence[tuple[RowCandidate, Fit]], clearly: float = CLEARLY_BETTER) -> tuple[RowCandidate, Fit]:
+def _likeliest(
+    trials: Sequence[tuple[RowCandidate, Fit]], present: Fit, clearly: float = CLEARLY_BETTER
+) -> tuple[RowCandidate, Fit]:
     """The likeliest effect with its fit; one that it contains, where the wider one is not `clearly` better."""
     price = float(np.log(trials[0][1].residual.size))
-    costs = {c.name: _squares(trial) + price * c.rank for c, trial in trials}
+    costs = {c.name: _squares(trial, present) + price * c.rank for c, trial in trials}
     best = min(trials, key=lambda trial: costs[trial[0].name])
     inner = [(c, trial) for c, trial in trials if c.name in best[0].effect.contains]
     as_good = [(c, trial) for c, trial in inner if costs[c.name] < costs[best[0].name] + clearly]

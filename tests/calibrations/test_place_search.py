@@ -102,6 +102,14 @@ def test_geometry_is_named_beside_a_cause() -> None:
     assert set(found.causes) == {"cubic-nonlinearity", "axis-nonorthogonality"}
 
 
+def test_a_place_is_found_where_the_noise_is_not_stated() -> None:
+    held = Held(1)
+    data = held.table(UNKNOWN_CURVES["cross-response"](held))
+    columns = {name: values for name, values in data.columns.items() if name != "n" and not name.endswith("_std")}
+    found = discovered(Table.from_columns("positions", columns, data.constants, "without noise"))
+    assert (found.causes, [place.name for place in found.findings.places]) == ((), ["cross-response"])
+
+
 def test_the_scatter_of_the_hand_has_no_place() -> None:
     for seed in range(2):
         found = discovered(Held(seed).table(scatter=3.0))
