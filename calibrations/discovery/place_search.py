@@ -178,7 +178,7 @@ def _score(fit: Fit) -> float:
 
 
 def _squares(fit: Fit, present: Fit) -> float:
-    """Sum of squares of the residual, in the white noise of the rows or, if none is known, in the residual of `present`."""
+    """Sum of squares of the residual in the noise of the rows; in the residual of `present` where none is known."""
     if fit.problem.white is None:
         return float(np.sum((fit.residual / present.rmse[:, None]) ** 2))
     return float(np.sum(fit.in_white_noise().whitened[:, 0] ** 2))
