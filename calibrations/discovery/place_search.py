@@ -271,13 +271,14 @@ def _as_search(
     steps = steps_to(start, basic, base, effects)
     steps += [Step(a.effect.name, *pair) for a, pair in zip(selected, pairwise(fits), strict=True)]
     acting = _acting_places(end, places)
+    # few attitudes of a motion do not tell geometry from what a place adds in proportion to the force
     unknown = max((place.size for place in acting if place.unknown), default=0.0)
-    named = (*causes, *(name for name in geometry if _size(end, [name]) >= LINEAR_PART * unknown))
+    visible = [name for name in geometry if _size(end, [name]) >= LINEAR_PART * unknown and not start.table.type.moving]
     rivals = {cause: names for place in places for cause, names in place.rivals_of_causes.items() if names}
     report("testing each effect alone")
     ranked = first_candidates(start, steps, candidates(start, effects))
     without_forms = causes_alone(fits[-1], [a for a in selected if a.effect.name.startswith(PREFIX)])
-    return StructuralSearch(start, tuple(steps), acting, named, rivals, ranked, without_forms)
+    return StructuralSearch(start, tuple(steps), acting, (*causes, *visible), rivals, ranked, without_forms)
 
 
 def _as_in(start: Fit, end: Fit, names: Sequence[str]) -> Model:

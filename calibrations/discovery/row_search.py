@@ -153,7 +153,7 @@ class RowSearch:
         self, path: Path, outliers: tuple[int, ...], effects: Mapping[str, Effect], origin: Fit
     ) -> Findings[Fit]:
         """The findings of the search that predicts better: that for places, or the one that adds effects."""
-        if self.table.type.moving and path.end.held_out_excess <= MATERIAL:
+        if self.table.type.moving and path.end.held_out_excess <= MOST_UNSEEN:
             return self._path_findings(path, effects, origin)
         from calibrations.discovery.place_search import search_places  # few data need it
 
