@@ -104,7 +104,7 @@ def place_curve(end: Fit, place: str) -> PlaceCurve | None:
     if not names or place_driver is None:
         return None
     driver, driver_unit, factor = place_driver
-    rows = _Rows.of(end)
+    rows = CurveRows.of(end)
     groups = _groups(rows, place, driver, factor)
     base = None if factor == "angle" else [_base(driver, factor, x, weight) for _, x, weight in groups.values()]
     value, std = _contribution(rows, names, base)
@@ -124,7 +124,7 @@ def place_curve(end: Fit, place: str) -> PlaceCurve | None:
 
 
 @dataclass(frozen=True)
-class _Rows:
+class CurveRows:
     """The rows along which a curve is drawn: poses, or samples whose force follows from the outputs or from the motion.
 
     `force`: what drives the place, g, (n, 3).
@@ -135,13 +135,13 @@ class _Rows:
     force: Array
 
     @staticmethod
-    def of(end: Fit) -> _Rows:
+    def of(end: Fit) -> CurveRows:
         """Those of a fitted model; of a long record a part."""
         if end.table.type.stage_angles:
-            return _Rows(end, end.table, static_force(end.table, end.problem.layout.steps(end.theta)))
+            return CurveRows(end, end.table, static_force(end.table, end.problem.layout.steps(end.theta)))
         samples, force = end.problem.samples, end.problem.sensed(end.theta)
         kept = np.arange(0, samples.n, 1 + samples.n // MOST_SAMPLES)
-        return _Rows(end, samples.rows(kept), force[kept])
+        return CurveRows(end, samples.rows(kept), force[kept])
 
     def output(self, theta: Array, without: Sequence[str] = ()) -> Array:
         """The output of each axis by a model without some of its effects, (channels, n)."""
@@ -149,6 +149,11 @@ class _Rows:
         if self.end.table.type.stage_angles:
             return forward(self.table, steps).T
         return respond(self.force, self.table, steps)[:, : len(self.table.axes)].T
+
+    def contribution(self, names: Sequence[str]) -> Array:
+        """What effects add to the output of each axis, without its mean, (channels, n)."""
+        added = self.output(self.end.theta) - self.output(self.end.theta, without=names)
+        return np.asarray(added - added.mean(axis=1, keepdims=True))
 
     def slope(self, mask: NDArray[np.bool_]) -> Array:
         """d output / d these parameters, but for its sign, (channels, n, p)."""
@@ -191,7 +196,7 @@ def _base(driver: str, factor: str, x: Array, weight: Array) -> Array:
     return np.asarray(np.linalg.qr(np.column_stack([np.ones(len(x)), *force]))[0])
 
 
-def _contribution(rows: _Rows, names: list[str], base: list[Array] | None) -> tuple[Array, Array]:
+def _contribution(rows: CurveRows, names: list[str], base: list[Array] | None) -> tuple[Array, Array]:
     """Contribution of effects to the output off the base, and its standard uncertainty, (channels, n)."""
     end = rows.end
     value = rows.output(end.theta) - rows.output(end.theta, without=names)
@@ -204,7 +209,7 @@ def _contribution(rows: _Rows, names: list[str], base: list[Array] | None) -> tu
     return value, np.sqrt(np.maximum(np.einsum("cni,ij,cnj->cn", J, cov, J), 0.0))
 
 
-def _groups(rows: _Rows, place: str, driver: str, factor: str) -> dict[str, tuple[list[int], Array, Array]]:
+def _groups(rows: CurveRows, place: str, driver: str, factor: str) -> dict[str, tuple[list[int], Array, Array]]:
     """By axis: channels, driver of the place, and factor of the curve, for all their rows."""
     table, force, count = rows.table, rows.force, len(rows.table.axes)
     if factor == "angle":

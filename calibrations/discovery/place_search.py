@@ -10,17 +10,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
-from itertools import pairwise
 
 import numpy as np
 
 from calibrations.criteria import CLEARLY_BETTER, MATERIAL, PATTERN_BETTER, SIGNIFICANT
-from calibrations.discovery.additions import BASIC, Addition, at_values_of, causes_alone, fit_one_by_one
+from calibrations.discovery.additions import BASIC, Addition, at_values_of, fit_one_by_one
 from calibrations.discovery.candidates import RowCandidate, candidates, refit_with, with_rivals
-from calibrations.discovery.findings import Step
+from calibrations.discovery.curves import CurveRows
 from calibrations.discovery.search import first_order_cost
 from calibrations.discovery.significance import chance
-from calibrations.discovery.structural import StructuralSearch, first_candidates, steps_to
+from calibrations.discovery.structural import StructuralSearch, fit_each_axis
 from calibrations.effects import Effect
 from calibrations.fitting.determined import lets_go
 from calibrations.fitting.fit import Fit, refit
@@ -37,9 +36,7 @@ from calibrations.free_forms.rivals import CLOSE
 from calibrations.free_forms.selection import ENTER, prices
 from calibrations.means.noise import rms
 from calibrations.model import Model
-from calibrations.model.chain import respond
 from calibrations.progress import report
-from calibrations.table import Array
 
 ROUNDS = 4  # in which the scatter of the rows is found from what the forms leave
 TRIALS = 3  # effects of any place that are fitted in the place of a form; those of its own place are fitted as well
@@ -49,7 +46,13 @@ SETTLED = 1.05  # of the scatter: a smaller change is none
 
 @dataclass(frozen=True)
 class _Place:
-    """A place that acts, its causes, and what the data cannot separate from it and from them."""
+    """A place that acts, and the effects that are its causes.
+
+    gain    of twice the log-likelihood by its forms, less their price
+    share   of the form's squares that the causes explain
+    rivals  other places that explain the data as well
+    rivals_of_causes  by cause, other effects that explain the data as well
+    """
 
     name: str
     gain: float
@@ -127,7 +130,10 @@ class _ActingForms:
 
     @property
     def following_columns(self) -> _ActingForms:
-        """The same with the place of a column for a curve over time that follows it: time follows any slow column."""
+        """The forms over a temperature, or over the scatter, in place of a curve over time that explains no more.
+
+        A curve over time follows every column that changes slowly.
+        """
         present = self
         for place in FOLLOWERS:
             if place in present.by_place:
@@ -149,7 +155,7 @@ def _fit_with_linear_effects(start: Fit, effects: Mapping[str, Effect]) -> Fit:
         for name in (*BASIC, *GEOMETRY)
         if name in effects and not start.model.holds(name) and effects[name].excluded(start.table) is None
     ]
-    return refit(start, reduce(Model.with_effect, [effects[name] for name in names], start.model)) if names else start
+    return fit_each_axis(start, names, effects)
 
 
 def _possible_places(fit: Fit) -> list[str]:
@@ -187,8 +193,8 @@ def _squares(fit: Fit, present: Fit) -> float:
 def _name(place: _Place, present: Fit, effects: Mapping[str, Effect]) -> tuple[Fit, _Place]:
     """The fit with the causes of a place instead of its form, or with one cause beside it, and the place with these.
 
-    The fit as it is, if no effect of the catalogue takes up most of the form. Several effects are causes only if no
-    form is needed beside them: together they follow nearly any curve.
+    If no effect of the catalogue takes up most of the form, the fit stays as it is. Several effects are causes only if
+    no form is needed beside them: together they follow nearly any curve.
     """
     without = refit(present, present.model.without(f"{PREFIX}{place.name}"))
     curve = _squares(without, present) - _squares(present, present)
@@ -262,23 +268,19 @@ def _as_search(
     geometry = [name for name in linear if name in GEOMETRY and _is_needed(end, start, name)]
     if len(basic) + len(geometry) < len(linear):
         end = refit(end, _as_in(start, end, [name for name in linear if name not in (*basic, *geometry)]))
-    base = refit(start, reduce(Model.with_effect, [effects[name] for name in basic], start.model)) if basic else start
+    base = fit_each_axis(start, basic, effects)
     causes = [cause for place in places for cause in place.causes]
     by_name = {term.name: term.effect for term in end.model.terms}
     forms = [name for name in by_name if name.startswith(PREFIX) and not start.model.holds(name)]
     added = at_values_of(end, [Addition(by_name[name]) for name in (*geometry, *causes, *forms)])
     selected, fits = fit_one_by_one(base, added, end)
-    steps = steps_to(start, basic, base, effects)
-    steps += [Step(a.effect.name, *pair) for a, pair in zip(selected, pairwise(fits), strict=True)]
+    found = StructuralSearch.of_fits(start, basic, selected, fits, effects)
     acting = _acting_places(end, places)
     # few attitudes of a motion do not tell geometry from what a place adds in proportion to the force
     unknown = max((place.size for place in acting if place.unknown), default=0.0)
     visible = [name for name in geometry if _size(end, [name]) >= LINEAR_PART * unknown and not start.table.type.moving]
     rivals = {cause: names for place in places for cause, names in place.rivals_of_causes.items() if names}
-    report("testing each effect alone")
-    ranked = first_candidates(start, steps, candidates(start, effects))
-    without_forms = causes_alone(fits[-1], [a for a in selected if a.effect.name.startswith(PREFIX)])
-    return StructuralSearch(start, tuple(steps), acting, (*causes, *visible), rivals, ranked, without_forms)
+    return replace(found, places=acting, named=(*causes, *visible), rivals=rivals)
 
 
 def _as_in(start: Fit, end: Fit, names: Sequence[str]) -> Model:
@@ -298,11 +300,11 @@ def _acting_places(end: Fit, places: Sequence[_Place]) -> tuple[ActingPlace, ...
     """The places with their sizes in the last fit, the largest first."""
     names = {place.name: _effects_of(end, place) for place in places}
     sizes = {name: _size(end, effects) for name, effects in names.items()}
-    largest = max(sizes.values())
+    largest, rows = max(sizes.values()), CurveRows.of(end)
     acting = [
         ActingPlace(
             place.name, sizes[place.name], sizes[place.name], largest, (), place.causes, place.share, True,
-            place.gain, place.rivals, _curve(end, names[place.name]),
+            place.gain, place.rivals, rows.contribution(names[place.name]),
         )
         for place in places
     ]  # fmt: skip
@@ -324,12 +326,3 @@ def _size(end: Fit, names: Sequence[str]) -> float:
     base = end.in_white_noise().whitened[:, 1:][:, linear]
     base = base / np.maximum(np.linalg.norm(base, axis=0), 1e-300)
     return float(rms(change - base @ np.linalg.lstsq(base, change, rcond=1e-9)[0]))
-
-
-def _curve(end: Fit, names: Sequence[str]) -> Array:
-    """What effects add to the output of each axis, without its mean, (axes, samples), in the output's unit."""
-    problem = end.problem
-    samples, force, steps = problem.samples, problem.sensed(end.theta), problem.layout.steps(end.theta)
-    others = [step for step in steps if step[0].name not in names]
-    added = respond(force, samples, steps) - respond(force, samples, others)
-    return np.asarray((added - added.mean(axis=0))[:, : len(samples.axes)].T)

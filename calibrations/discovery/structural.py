@@ -7,7 +7,7 @@ and so does a place without a cause: the error falls, and the cause remains unkn
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from calibrations.criteria import MATERIAL, MOST_UNEXPLAINED, SIGNIFICANT
@@ -63,12 +63,24 @@ class StructuralSearch:
 
     start: Fit
     steps: tuple[Step[Fit], ...]
-    places: tuple[ActingPlace, ...]
-    named: tuple[str, ...]
-    rivals: Mapping[str, tuple[str, ...]]
     candidates: tuple[RowCandidate, ...]
     causes_alone: Fit
+    places: tuple[ActingPlace, ...] = ()
+    named: tuple[str, ...] = ()
+    rivals: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+
+    @classmethod
+    def of_fits(
+        cls, start: Fit, freed: list[str], added: list[Addition], fits: list[Fit], effects: Mapping[str, Effect]
+    ) -> StructuralSearch:
+        """The search whose steps are the effects `freed`, up to the first of the `fits`, and then the additions."""
+        steps = _steps(start, freed, fits[0], effects)
+        steps += [Step(a.effect.name, *pair) for a, pair in zip(added, pairwise(fits), strict=True)]
+        report("testing each effect alone")
+        ranked = _first(start, steps, candidates(start, effects))
+        forms = [a for a in added if a.effect.name.startswith(PREFIX)]
+        return cls(start, tuple(steps), ranked, causes_alone(fits[-1], forms))
 
     @property
     def end(self) -> Fit:
@@ -94,7 +106,7 @@ class StructuralSearch:
 def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSearch:
     """The effects and free forms that the model of `start` misses."""
     basic = [name for name in BASIC if name in effects and not start.model.holds(name)]
-    base = _fit_each_axis(start, basic, effects)
+    base = fit_each_axis(start, basic, effects)
     stated_white = start.problem.white
     base, best, floor = _best_structure(base, effects)
     remarks: tuple[str, ...] = ()
@@ -104,18 +116,14 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
     needed = [name for name in basic if chance(*first_order_cost(best.end, name, shared=True)) < SIGNIFICANT]
     report("fitting the model with one effect more at a time")
     if needed != basic:
-        base = _fit_each_axis(start, needed, effects)
+        base = fit_each_axis(start, needed, effects)
     selected, fits = _fit_each_addition(base, best, renew=needed != basic)
     if floor is not None and stated_white is not None:
         fits[-1] = with_least_white(fits[-1], stated_white)
-    steps = steps_to(start, needed, base, effects)
-    steps += [Step(a.effect.name, *pair) for a, pair in zip(selected, pairwise(fits), strict=True)]
-    report("testing each effect alone")
-    ranked = first_candidates(start, steps, candidates(start, effects))
-    forms = [a for a in selected if a.effect.name.startswith(PREFIX)]
-    found, without_forms = best.structure, causes_alone(fits[-1], forms)
-    return StructuralSearch(
-        start, tuple(steps), found.places, found.causes, found.alternatives, ranked, without_forms, remarks
+    found = StructuralSearch.of_fits(start, needed, selected, fits, effects)
+    structure = best.structure
+    return replace(
+        found, places=structure.places, named=structure.causes, rivals=structure.alternatives, remarks=remarks
     )
 
 
@@ -282,7 +290,7 @@ def _fit_before_stairs(base: Fit, effects: Mapping[str, Effect]) -> tuple[Fit, _
     return base, structure_fit, end.share_left(unconverted)
 
 
-def _fit_each_axis(start: Fit, names: list[str], effects: Mapping[str, Effect]) -> Fit:
+def fit_each_axis(start: Fit, names: list[str], effects: Mapping[str, Effect]) -> Fit:
     """The fit in which each axis has its own value of these effects."""
     model = start.model
     for name in names:
@@ -290,13 +298,13 @@ def _fit_each_axis(start: Fit, names: list[str], effects: Mapping[str, Effect]) 
     return refit(start, model) if names else start
 
 
-def steps_to(start: Fit, names: list[str], base: Fit, effects: Mapping[str, Effect]) -> list[Step[Fit]]:
+def _steps(start: Fit, names: list[str], base: Fit, effects: Mapping[str, Effect]) -> list[Step[Fit]]:
     """A step for each effect that was freed; the last ends at `base`."""
-    fits = [start, *(_fit_each_axis(start, names[: k + 1], effects) for k in range(len(names) - 1)), base]
+    fits = [start, *(fit_each_axis(start, names[: k + 1], effects) for k in range(len(names) - 1)), base]
     return [Step(name, *pair) for name, pair in zip(names, pairwise(fits[: len(names) + 1]), strict=True)]
 
 
-def first_candidates(start: Fit, steps: list[Step[Fit]], ranked: list[RowCandidate]) -> tuple[RowCandidate, ...]:
+def _first(start: Fit, steps: list[Step[Fit]], ranked: list[RowCandidate]) -> tuple[RowCandidate, ...]:
     """The candidates on the given model, those of the steps first, the first one with the errors of its full fit.
 
     A single cause has the rivals of the search that adds effects; several causes have none here.

@@ -108,8 +108,8 @@ class Shown:
     def deviance(self, sizes: Sizes) -> float:
         """-2 log restricted likelihood with forms of these sizes, in the likeliest scatter of the rows.
 
-        The scatter is no smaller than the noise of the rows, where that is known. Few rows leave it uncertain: a form
-        that takes up many of them gains less than in a scatter that were known.
+        The scatter is no smaller than the noise of the rows, where that is known. Few rows leave the scatter uncertain,
+        and a form with many coefficients then gains less.
         """
         g = self.gram
         quadratic = g.squares - float(g.with_data[g.indices(sizes.variances)] @ sizes.coefficients)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,10 +13,11 @@ from calibrations.discovery.results import Discovery
 from calibrations.discovery.verdict import Verdict
 from calibrations.documents import places_document
 from calibrations.effects.catalogue import catalogue
-from calibrations.fitting.fit import Fit
+from calibrations.fitting.determined import lets_go
+from calibrations.fitting.fit import Fit, fit
 from calibrations.loop import discover
 from calibrations.model.file import read_model
-from calibrations.presentation.charts.places import place_pictures
+from calibrations.presentation.charts.places import forms_through, model_curves, place_pictures
 from calibrations.table import Array, Table
 from tests.benchmark.shaking import Mechanism, Signals, measured, size_for
 from tests.calibrations.hand_held import SHARES, Held, N
@@ -52,6 +54,8 @@ def test_an_unknown_cause_has_its_place_and_no_name(place: str, seed: int) -> No
     assert found.causes == ()
     assert [acting.name for acting in found.findings.places] == [place]
     assert found.end.held_out_excess < 1.5 < found.start.held_out_excess
+    assert found.findings.curves == (f"free:{place}",)
+    assert "exact form" not in found.judgement.text  # a curve without a cause refines nothing
 
 
 def test_the_curve_of_a_place_is_the_function_that_acts_within_its_band() -> None:
@@ -93,6 +97,19 @@ def test_a_cause_in_another_form_keeps_its_curve() -> None:
     found = discovered(held.table(warming(held, bend=0.4)))
     assert found.causes == ("temperature-bias",)
     assert [step.name for step in found.steps] == ["temperature-bias", "free:temperature-bias"]
+    assert found.findings.curves == ()
+    (curve,) = model_curves(found.end)
+    assert "temperature-bias" in [form.name for form in forms_through(found.end, curve)]
+
+
+def test_positions_that_all_have_one_force_are_no_calibration() -> None:
+    right = fit(read_model("linear"), Held(1).table())
+    theta = right.theta.copy()
+    theta[[1, 3, 4, 5]] = -1e7, 1e4, 1e7, 1e4  # bias y, scale factors: every force is (0, 1, 0)
+    wrong = replace(right, theta=theta, residual=right.problem.residual(theta))
+    assert wrong.pooled_excess < 1.5
+    assert lets_go(right, wrong)
+    assert not lets_go(right, right)
 
 
 def test_geometry_is_named_beside_a_cause() -> None:

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from calibrations.discovery.curves import PlaceCurve, place_curve
+from calibrations.discovery.curves import CurveRows, PlaceCurve, place_curve
 from calibrations.discovery.findings import Step
 from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue
@@ -16,7 +16,6 @@ from calibrations.errors import CalibrationError
 from calibrations.fitting.fit import Fit, fit
 from calibrations.free_forms.place_names import EFFECTS_AT, KINDS_OF_FORMS, PREFIX, place_of_effect
 from calibrations.model import Model
-from calibrations.model.chain import forward, respond
 from calibrations.presentation.chart import (
     AMBER,
     BAND,
@@ -103,16 +102,12 @@ def forms_through(end: Fit, curve: PlaceCurve) -> list[FittedForm]:
     """
     if not end.model.holds(f"{PREFIX}{curve.place}") or end.table.type.moving:
         return []
-    steps = end.problem.layout.steps(end.theta)
-    steps_of_place = [step for step in steps if step[0].name in BASE or place_of_effect(step[0].name) == curve.place]
-    known_pose = end.table.type.stage_angles
-    predicted = (
-        forward(end.table, steps_of_place)
-        if known_pose
-        else respond(end.problem.sensed(end.theta), end.table, steps_of_place)
+    others = [t.name for t in end.model.terms if t.name not in BASE and place_of_effect(t.name) != curve.place]
+    rows = CurveRows.of(end)
+    predicted = rows.output(end.theta, without=others)
+    table = replace(
+        rows.table, columns={**rows.table.columns, **dict(zip(rows.table.output_names, predicted, strict=True))}
     )
-    outputs = dict(zip(end.table.output_names, predicted.T, strict=True))
-    table = replace(end.table, columns={**end.table.columns, **outputs})
     table = table.rows(np.arange(0, table.n, max(1, table.n // MOST_ROWS)))  # without noise, a part of the poses does
     base = replace(end.model, terms=tuple(term for term in end.model.terms if term.name in BASE))
     effects_by_name = catalogue()
