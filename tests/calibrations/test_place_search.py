@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from calibrations.discovery.curves import place_curves
+from calibrations.discovery.place_search import _possible_places
 from calibrations.discovery.results import Discovery
 from calibrations.discovery.verdict import Verdict
 from calibrations.documents import places_document
@@ -18,6 +19,7 @@ from calibrations.fitting.fit import Fit, fit
 from calibrations.loop import discover
 from calibrations.model.file import read_model
 from calibrations.presentation.charts.places import forms_through, model_curves, place_pictures
+from calibrations.presentation.report.report import _steps
 from calibrations.table import Array, Table
 from tests.benchmark.shaking import Mechanism, Signals, measured, size_for
 from tests.calibrations.hand_held import SHARES, Held, N
@@ -56,6 +58,7 @@ def test_an_unknown_cause_has_its_place_and_no_name(place: str, seed: int) -> No
     assert found.end.held_out_excess < 1.5 < found.start.held_out_excess
     assert found.findings.curves == (f"free:{place}",)
     assert "exact form" not in found.judgement.text  # a curve without a cause refines nothing
+    assert _steps(found).rows[-1][-1] == "unknown cause"
 
 
 def test_the_curve_of_a_place_is_the_function_that_acts_within_its_band() -> None:
@@ -68,6 +71,7 @@ def test_the_curve_of_a_place_is_the_function_that_acts_within_its_band() -> Non
     true = 2e-3 * np.sin(4 * curve.at["x"]) - np.polyval(line, curve.at["x"])
     assert np.mean(np.abs(curve.value["x"] - true) < 3 * curve.std["x"]) > 0.9
     assert np.max(np.abs(curve.value["x"] - true)) < 0.15 * np.ptp(true)
+    assert np.mean(curve.std["x"]) < 3 * np.std(curve.value["x"] - true)
     (document,) = places_document(found)
     assert document["place"] == "cross-response"
     assert document["curve"]["unit"] == "g"
@@ -90,6 +94,17 @@ def test_what_a_model_has_already_is_not_found_again() -> None:
     assert [step.name for step in found.steps] == ["free:cross-response"]
     again = discover(data, found.end.model)
     assert (again.verdict, again.steps) == (Verdict.ADEQUATE, ())
+
+
+def test_a_second_place_is_found_beside_the_form_that_a_model_has() -> None:
+    held = Held(1)
+    one = UNKNOWN_CURVES["cross-response"](held)
+    known = discovered(held.table(one)).end
+    assert "cross-response" not in _possible_places(known)
+    model = known.model
+    found = discover(held.table(one + UNKNOWN_CURVES["time-bias"](held)), model)
+    assert [step.name for step in found.steps] == ["free:time-bias"]
+    assert found.end.held_out_excess < 1.5
 
 
 def test_a_cause_in_another_form_keeps_its_curve() -> None:
@@ -131,6 +146,13 @@ def test_the_scatter_of_the_hand_has_no_place() -> None:
     for seed in range(2):
         found = discovered(Held(seed).table(scatter=3.0))
         assert (found.causes, found.steps, found.findings.places) == ((), (), ())
+
+
+def test_a_place_is_found_beside_the_scatter_of_the_hand() -> None:
+    held = Held(1)
+    found = discovered(held.table(2 * UNKNOWN_CURVES["own-response"](held), scatter=3.0))
+    assert [place.name for place in found.findings.places] == ["own-response"]
+    assert found.end.pooled_excess == pytest.approx(np.hypot(1, 3), rel=0.15)  # the curve does not follow the scatter
 
 
 def test_the_order_of_rows_changes_no_place() -> None:
