@@ -285,9 +285,8 @@ def _as_search(
 
 def _as_in(start: Fit, end: Fit, names: Sequence[str]) -> Model:
     """The model of `end` with these effects as the model of `start` has them: for all axes alike, or not at all."""
-    before = {term.name: term for term in start.model.terms}
-    terms = (before.get(term.name) if term.name in names else term for term in end.model.terms)
-    return replace(end.model, terms=tuple(term for term in terms if term is not None))
+    model = reduce(Model.without, names, end.model)
+    return replace(model, terms=(*(term for term in start.model.terms if term.name in names), *model.terms))
 
 
 def _is_needed(end: Fit, start: Fit, name: str) -> bool:

@@ -224,7 +224,8 @@ class Model(ReportedResult):
     def without(self, name: str) -> Model:
         """The model with one effect less."""
         terms = tuple(term for term in self.terms if term.name != name)
-        return replace(self, name=self.name.replace(f"+{name}", ""), terms=terms)
+        first, *added = self.name.split("+")
+        return replace(self, name="+".join([first, *(each for each in added if each != name)]), terms=terms)
 
     def for_table(self, table: Table) -> Model:
         """The model without the effects that this kind of table cannot have, with its constants set."""

@@ -166,6 +166,9 @@ def test_adding_an_effect_leaves_the_old_model_alone() -> None:
     assert linear.effects == ("bias", "scale-factor")
     assert more.effects == ("bias", "scale-factor", "hysteresis")
     assert more.without("hysteresis") == linear
+    drifting = linear.with_effect(catalogue()["bias-drift"]).with_effect(catalogue()["warm-up-bias"])
+    assert drifting.without("bias").name == "linear+bias-drift+warm-up-bias"
+    assert drifting.without("bias-drift").name == "linear+warm-up-bias"
 
 
 def test_a_tied_effect_is_untied_instead_of_added() -> None:

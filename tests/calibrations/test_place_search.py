@@ -112,6 +112,7 @@ def test_a_cause_in_another_form_keeps_its_curve() -> None:
     found = discovered(held.table(warming(held, bend=0.4)))
     assert found.causes == ("temperature-bias",)
     assert [step.name for step in found.steps] == ["temperature-bias", "free:temperature-bias"]
+    assert found.end.model.name == "linear+temperature-bias+free:temperature-bias"
     assert found.findings.curves == ()
     (curve,) = model_curves(found.end)
     assert "temperature-bias" in [form.name for form in forms_through(found.end, curve)]
