@@ -78,16 +78,35 @@ class RowSearch:
         """The effects that the model of `start` misses; `outliers` are the rows that its fit excludes."""
         effects = self._searchable(effects)
         findings = self._search_model(start, outliers, origin, effects)
-        remarks = list[str]()
-        if (white := _white_with_scatter(findings)) is not None:
-            report("searching with the scatter of the poses as their noise")
-            scattered = fit(start.model, with_white(start.table, white))
-            findings = self._search_model(scattered, outliers, scattered if origin is start else origin, effects)
-            remarks.append(SCATTER_IS_NOISE)
+        scattered = self._search_in_scatter(findings, start, outliers, origin, effects)
+        if scattered is not None and scattered.end.pooled_excess < LEAST_NOISE:  # a cause made most of the scatter
+            findings = self._search_model(start, outliers, origin, effects, always_places=True)
+            scattered = self._search_in_scatter(findings, start, outliers, origin, effects)
+        findings, remarks = (findings, []) if scattered is None else (scattered, [SCATTER_IS_NOISE])
         excluded_places = self.table.left_out
         remarks += [f"Places left out of the search: {', '.join(excluded_places)}."] if excluded_places else []
         remarks += [sentence(ONE_ORIENTATION)] if one_orientation(self.table) else []
         return replace(findings, remarks=(*findings.remarks, *remarks))
+
+    def _search_in_scatter(
+        self,
+        findings: Findings[Fit],
+        start: Fit,
+        outliers: tuple[int, ...],
+        origin: Fit,
+        effects: Mapping[str, Effect],
+    ) -> Findings[Fit] | None:
+        """The findings if the scatter of the poses about the end of `findings` is their noise; None if it is not.
+
+        Places are searched although the residual then has the size of the noise: a cause whose sign changes from pose
+        to pose, in poses in random order, can be what scatters.
+        """
+        if (white := _white_with_scatter(findings)) is None:
+            return None
+        report("searching with the scatter of the poses as their noise")
+        scattered = fit(start.model, with_white(start.table, white))
+        given = scattered if origin is start else origin
+        return self._search_model(scattered, outliers, given, effects, always_places=True)
 
     def rejected(self, start: Fit, reason: Finding) -> Findings[Fit]:
         """Findings for data that cannot be searched for effects, for this reason."""
@@ -123,8 +142,14 @@ class RowSearch:
         return {name: effect for name, effect in effects.items() if place_of_effect(name) not in self.table.left_out}
 
     def _search_model(
-        self, start: Fit, outliers: tuple[int, ...], origin: Fit, effects: Mapping[str, Effect]
+        self,
+        start: Fit,
+        outliers: tuple[int, ...],
+        origin: Fit,
+        effects: Mapping[str, Effect],
+        always_places: bool = False,
     ) -> Findings[Fit]:
+        """The findings beyond the model of `start`; `always_places`: also where its residual looks like noise."""
         few_steps = self._shows_places or self._shows_forms
         path = find_path(start, outliers, effects, max_steps=1 if few_steps else MOST_EFFECTS)
         if self.table.type.moving:
@@ -134,7 +159,7 @@ class RowSearch:
         if self._shows_places and (own_names := effects.keys() - catalogue().keys()):
             further = continue_path(path, effects)  # the structural search knows no place for the user's effects
             path = further if own_names & {step.selected.name for step in further.steps} else path
-        explained = _is_explained(path)
+        explained = _is_explained(path) and not always_places
         if self._shows_forms and not (explained and path.end.pooled_excess < NO_MORE_THAN_NOISE):
             return self._findings_without_stages(path, outliers, effects, origin)
         if not self._shows_places or explained:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -35,6 +36,7 @@ OUTLYING = 4.0  # times the usual residual: more counts as so much
 SEEN_FORM = 0.9  # of a place's variance: the form of the catalogue itself, not one near it
 FIRST_POSES, OVER_SOON = 0.06, 0.8  # of a record, and of the variance of what decays within them
 KEPT = 0.1  # noise floors: rough columns that together add less are left out of a form
+STAGE_ANGLES = frozenset({"stage-angle-alpha", "stage-angle-beta"})
 LINEAR = {"cross-response": "cross", "z-response": "out-of-plane"}  # places with a linear part, and their drivers
 
 
@@ -86,9 +88,15 @@ class Structure:
         places_of_named = {
             place.name for place in self.places if set(cause_names) & set(place.causes) and cause not in place.causes
         }
+        places_of_named |= self._places_of_larger_offsets(cause)
         return bool(alternatives & (places_of_named | set(cause_names))) or any(
             cause in self.alternatives.get(named_cause, ()) for named_cause in cause_names
         )
+
+    def _places_of_larger_offsets(self, cause: str) -> AbstractSet[str]:
+        """The places of the stages' angles, where the stages' zero offsets are larger than the place of a cause."""
+        size = max((place.size for place in self.places if cause in place.causes), default=np.inf)
+        return STAGE_ANGLES if self.geometry.sizes.get("stage-zero-offset", 0.0) > size else frozenset()
 
     @property
     def follows_noise(self) -> bool:

@@ -1,0 +1,111 @@
+"""Mechanisms of real sensors whose form is far from the catalogue's: one mechanism has one name, and none is noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from calibrations.discovery.results import Discovery
+from calibrations.effects.catalogue import catalogue
+from calibrations.fitting.fit import Fit
+from calibrations.free_forms.chain import ModelEffects, start
+from calibrations.free_forms.descent import Point, Setting, finish
+from calibrations.free_forms.naming import places
+from calibrations.free_forms.places import components
+from calibrations.free_forms.poses import PoseData
+from calibrations.loop import dataset
+from calibrations.model.file import read_model
+from calibrations.table import Array
+from tests.calibrations import synthetic
+from tests.slow import slow
+
+TURN = synthetic.turns((90, 30, 150, 60, 120), step_deg=10)
+DURATION_S = float(np.ptp(TURN["t_s"]))
+
+
+def forces(columns: dict[str, Array], alpha_deg: Array | float = 0.0, beta_deg: Array | float = 0.0) -> Array:
+    """Specific force, g, (n, 3), where the stages are off their readings by these angles."""
+    true = {"alpha_deg": columns["alpha_deg"] + alpha_deg, "beta_deg": columns["beta_deg"] + beta_deg}
+    return np.column_stack(synthetic.components(true))
+
+
+def discover(columns: dict[str, Array], outputs: Array) -> Discovery[Fit]:
+    table = synthetic.poses(columns, *(np.array([2.5, 2.52]) + outputs * [1.0, 0.9]).T)
+    return dataset(table).discover(read_model("linear"), catalogue())
+
+
+def in_all_directions(count: int, seed: int) -> dict[str, Array]:
+    """Columns of poses whose directions are random, as is their order."""
+    rng = np.random.default_rng(seed)
+    alpha, beta = np.degrees(np.arccos(rng.uniform(-1, 1, count))), rng.uniform(0, 360, count)
+    return {"alpha_deg": alpha, "beta_deg": beta, "direction": np.ones(count), "t_s": 9.0 * np.arange(count) + 50.0}
+
+
+def swings_of_the_arm() -> dict[str, Array]:
+    """Columns of poses over inclinations to both sides, there and back, at one angle of the turntable after another."""
+    up = np.arange(-150.0, 151.0, 20.0)
+    alpha = np.concatenate([up if k % 2 == 0 else up[::-1] for k in range(14)])
+    columns = {"alpha_deg": alpha, "beta_deg": np.repeat(np.arange(14) * 25.0, len(up))}
+    columns["direction"] = np.repeat([1.0 if k % 2 == 0 else -1.0 for k in range(14)], len(up))
+    return columns | {"t_s": 7.0 * np.arange(len(alpha)) + 100.0}
+
+
+@pytest.mark.parametrize("seed", [4, *slow([5, 6])])
+def test_a_base_that_moves_slowly_is_no_scatter_of_poses_in_random_order(seed: int) -> None:
+    """Its sign changes from pose to pose. Means without a stated filter may scatter more than their samples say."""
+    poses = in_all_directions(240, seed)
+    a = forces(poses)
+    tilt = 1e-3 * np.sin(2 * np.pi * poses["t_s"] / (0.4 * np.ptp(poses["t_s"])) + 4.45)
+    beta = np.radians(poses["beta_deg"])
+    found = discover(poses, a[:, :2] + (tilt * a[:, 2])[:, None] * np.column_stack([np.cos(beta), np.sin(beta)]))
+    assert (found.verdict, found.causes) == ("unexplained", ())
+    assert found.start.pooled_excess > 5
+    assert found.steps[-1].held_out_after < 1.15
+    assert "scatter of the poses" not in found.judgement.text
+
+
+def test_an_out_of_plane_gap_has_one_name_for_its_line_and_its_curve() -> None:
+    a = forces(TURN)
+    found = discover(TURN, a[:, :2] + 4e-3 / (1 - 0.35 * a[:, 2:]))
+    assert found.causes == ("z-axis-bias",)
+    assert found.steps[-1].held_out_after < 1.15
+
+
+def test_a_misalignment_beside_an_out_of_plane_gap_keeps_its_name() -> None:
+    """Its angle about z shows it."""
+    a = forces(TURN, beta_deg=0.1)
+    turned = a[:, :2] + np.radians([0.1, -0.1]) * a[:, 2:]
+    found = discover(TURN, turned + 4e-3 / (1 - 0.35 * a[:, 2:]))
+    assert "z-axis-bias" in found.causes
+    assert {"axis-misalignment", "stage-zero-offset"} & set(found.causes)
+
+
+def test_a_warm_up_with_two_time_constants_is_one_cause() -> None:
+    """The effect acts at the shorter one, beside a curve with the longer one: its name needs most of both together."""
+    t = (TURN["t_s"] - TURN["t_s"][0]) / DURATION_S
+    warming = 8e-3 * (0.5 * np.exp(-t / 0.03) + 0.5 * np.exp(-t / 0.3))
+    outputs = 2.5 + forces(TURN)[:, :2] * (1 + warming[:, None] * [1.0, -0.8])
+    data = PoseData.of(synthetic.poses(TURN, *outputs.T))
+    given = ModelEffects.without_effects(data)
+    setting = Setting(data, np.full((2, data.n), synthetic.NOISE_V), given)
+    values = start(data, given)
+    state = setting.state_at(values, ())
+    acting = dict.fromkeys(("time-scale/curve", "time-scale/warm-up-scale@0.040"), 1e-4)
+    found = finish(setting, Point(components(data, state), acting, values, state), {}, {})
+    (place,) = places(found)
+    assert place.causes == ("warm-up-scale",)
+    assert place.share > 0.9
+
+
+def test_an_eccentric_stage_with_a_second_wave_has_its_name() -> None:
+    beta = np.radians(TURN["beta_deg"])
+    found = discover(TURN, forces(TURN, beta_deg=0.1 * (np.sin(beta + 0.4) + 0.36 * np.sin(2 * beta + 1.1)))[:, :2])
+    assert found.causes == ("stage-eccentricity",)
+    assert found.verdict == "adequate"
+
+
+def test_an_arm_that_sags_is_an_offset_of_the_stage_and_no_effect_of_the_sensor() -> None:
+    columns = swings_of_the_arm()
+    sag = 0.063 * (1 + 0.15 * np.sin(np.radians(columns["alpha_deg"])))
+    found = discover(columns, forces(columns, alpha_deg=sag, beta_deg=-0.03)[:, :2])
+    assert found.causes == ("stage-zero-offset",)
