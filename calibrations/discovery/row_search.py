@@ -78,35 +78,21 @@ class RowSearch:
         """The effects that the model of `start` misses; `outliers` are the rows that its fit excludes."""
         effects = self._searchable(effects)
         findings = self._search_model(start, outliers, origin, effects)
-        scattered = self._search_in_scatter(findings, start, outliers, origin, effects)
-        if scattered is not None and scattered.end.pooled_excess < LEAST_NOISE:  # a cause made most of the scatter
+        white, remarks = _white_with_scatter(findings), list[str]()
+        caused = white is not None and self._has_cause(start, white)
+        if caused:
             findings = self._search_model(start, outliers, origin, effects, always_places=True)
-            scattered = self._search_in_scatter(findings, start, outliers, origin, effects)
-        findings, remarks = (findings, []) if scattered is None else (scattered, [SCATTER_IS_NOISE])
+            white = _white_with_scatter(findings)
+        if white is not None:
+            report("searching with the scatter of the poses as their noise")
+            scattered = fit(start.model, with_white(start.table, white))
+            origin = scattered if origin is start else origin
+            findings = self._search_model(scattered, outliers, origin, effects, always_places=caused)
+            remarks.append(SCATTER_IS_NOISE)
         excluded_places = self.table.left_out
         remarks += [f"Places left out of the search: {', '.join(excluded_places)}."] if excluded_places else []
         remarks += [sentence(ONE_ORIENTATION)] if one_orientation(self.table) else []
         return replace(findings, remarks=(*findings.remarks, *remarks))
-
-    def _search_in_scatter(
-        self,
-        findings: Findings[Fit],
-        start: Fit,
-        outliers: tuple[int, ...],
-        origin: Fit,
-        effects: Mapping[str, Effect],
-    ) -> Findings[Fit] | None:
-        """The findings if the scatter of the poses about the end of `findings` is their noise; None if it is not.
-
-        Places are searched although the residual then has the size of the noise: a cause whose sign changes from pose
-        to pose, in poses in random order, can be what scatters.
-        """
-        if (white := _white_with_scatter(findings)) is None:
-            return None
-        report("searching with the scatter of the poses as their noise")
-        scattered = fit(start.model, with_white(start.table, white))
-        given = scattered if origin is start else origin
-        return self._search_model(scattered, outliers, given, effects, always_places=True)
 
     def rejected(self, start: Fit, reason: Finding) -> Findings[Fit]:
         """Findings for data that cannot be searched for effects, for this reason."""
@@ -134,6 +120,18 @@ class RowSearch:
             alternatives={effect.name: rivals} if rivals else {},
             searched=False,
         )  # fmt: skip
+
+    def _has_cause(self, start: Fit, scatter: Array) -> bool:
+        """Whether places explain a part of the `scatter` of the poses, (channels, n).
+
+        In poses in random order, the sign of what follows the time or the force changes from pose to pose.
+        """
+        if not self._shows_places:
+            return False
+        from calibrations.discovery.structural import residual_beside_places  # only this search needs it
+
+        report("searching for a cause of the scatter of the poses")
+        return residual_beside_places(fit(start.model, with_white(start.table, scatter))) < LEAST_NOISE
 
     def _searchable(self, effects: Mapping[str, Effect]) -> Mapping[str, Effect]:
         """The effects at places that are not excluded; at one orientation, only those that the data can show."""

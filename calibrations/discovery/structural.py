@@ -38,6 +38,8 @@ from calibrations.fitting.requested_forms import BASE, effects_beyond_base
 from calibrations.free_forms.geometry import GEOMETRY, GeometryEffects
 from calibrations.free_forms.naming import ActingPlace
 from calibrations.free_forms.place_names import PREFIX
+from calibrations.free_forms.poses import PoseData
+from calibrations.free_forms.search import search
 from calibrations.free_forms.stairs import before_stairs, find_stairs, fit_stairs, noise_of_rounded
 from calibrations.free_forms.structure import FloorSource, Structure, find_structure, with_stairs
 from calibrations.means.noise import rms, with_white
@@ -322,6 +324,13 @@ def structure(start: Fit, effects: Mapping[str, Effect]) -> Structure:
     """The places that act beyond the model of `start`."""
     geometry = _geometry_effects(start, effects)
     return find_structure(start.table, start.problem.white, effects_beyond_base(start), geometry)
+
+
+def residual_beside_places(start: Fit) -> float:
+    """The residual beside all places that act in the stated noise of the poses, rms over this noise."""
+    white = start.problem.white
+    assert white is not None  # noqa: S101 the caller states it
+    return search(PoseData.of(start.table), white, effects_beyond_base(start)).ratio
 
 
 def _geometry_effects(start: Fit, effects: Mapping[str, Effect]) -> GeometryEffects:

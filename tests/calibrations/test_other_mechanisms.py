@@ -50,12 +50,12 @@ def swings_of_the_arm() -> dict[str, Array]:
     return columns | {"t_s": 7.0 * np.arange(len(alpha)) + 100.0}
 
 
-@pytest.mark.parametrize("seed", [4, *slow([5, 6])])
+@pytest.mark.parametrize("seed", [1, *slow([2, 3])])
 def test_a_base_that_moves_slowly_is_no_scatter_of_poses_in_random_order(seed: int) -> None:
     """Its sign changes from pose to pose. Means without a stated filter may scatter more than their samples say."""
-    poses = in_all_directions(240, seed)
+    poses = in_all_directions(100, seed)
     a = forces(poses)
-    tilt = 1e-3 * np.sin(2 * np.pi * poses["t_s"] / (0.4 * np.ptp(poses["t_s"])) + 4.45)
+    tilt = 1e-3 * np.sin(2 * np.pi * poses["t_s"] / (0.61 * np.ptp(poses["t_s"])) + 4.45)
     beta = np.radians(poses["beta_deg"])
     found = discover(poses, a[:, :2] + (tilt * a[:, 2])[:, None] * np.column_stack([np.cos(beta), np.sin(beta)]))
     assert (found.verdict, found.causes) == ("unexplained", ())
