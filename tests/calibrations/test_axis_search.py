@@ -16,7 +16,6 @@ from calibrations.analyses.misalignment import (
 from calibrations.errors import DataError
 from calibrations.table import Array, Table
 from procedures.misalignment import Centre, round_poses
-from tests.golden.messages import Golden
 
 
 def direction_x(alpha_deg: float, beta_deg: float) -> Array:
@@ -116,7 +115,7 @@ def test_the_correction_is_that_of_ang() -> None:
     np.testing.assert_allclose(a @ correction_matrix(X, Y).T, along_reference(a, X, Y), atol=1e-15)
 
 
-def test_a_search_without_a_complete_round_is_refused(golden: Golden) -> None:
+def test_a_search_without_a_complete_round_is_refused(golden) -> None:
     table = search(rounds=1)
     half = {name: column[:15] for name, column in table.columns.items()}
     with golden.refused(DataError):

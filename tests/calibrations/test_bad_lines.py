@@ -13,7 +13,6 @@ from calibrations.files import open_text_file
 from calibrations.importing.cells import SHARES, Policy
 from calibrations.importing.foreign import ImportedTable, import_sheet
 from calibrations.importing.sheet import read_sheet
-from tests.golden.messages import Golden
 
 HEADER = "t_s,ax,ay,az"
 N = 4000
@@ -78,7 +77,7 @@ def test_a_damaged_line_among_the_first_does_not_hide_its_column(tmp_path: Path,
     assert imported(tmp_path, given).table.column("ax").shape == (N - 1,)
 
 
-def test_the_strict_policy_refuses_the_first_damaged_line(golden: Golden, tmp_path: Path) -> None:
+def test_the_strict_policy_refuses_the_first_damaged_line(golden, tmp_path: Path) -> None:
     given: list[str | bytes] = [*lines()]
     given[1000] = given[1500] = "10,0.1"
     with golden.refused(DataError):
@@ -97,7 +96,7 @@ def test_many_damaged_lines_are_refused_unless_a_person_skips_them(tmp_path: Pat
                                    "line 141 (1 values for 4 columns) and 192 more.")  # fmt: skip
 
 
-def test_more_than_half_is_refused_in_any_case(golden: Golden, tmp_path: Path) -> None:
+def test_more_than_half_is_refused_in_any_case(golden, tmp_path: Path) -> None:
     given: list[str | bytes] = [*lines()]
     given[300:2600] = ["?,?,?,?"] * 2300
     with golden.refused(DataError):

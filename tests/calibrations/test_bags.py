@@ -17,7 +17,6 @@ from calibrations.errors import DataError
 from calibrations.importing.binary import open_sheet
 from calibrations.importing.foreign import import_sheet
 from calibrations.importing.topics import SeveralTopics
-from tests.golden.messages import Golden
 
 N = 25
 DIRECTIONS = np.random.default_rng(3).normal(size=(N, 3))
@@ -93,7 +92,7 @@ def test_an_imu_is_read_with_its_units_and_the_time_of_its_header(storage: str, 
             open_sheet(each, "/imo")
 
 
-def test_two_imus_have_to_be_chosen_and_a_mixed_topic_is_refused(golden: Golden, tmp_path: Path) -> None:
+def test_two_imus_have_to_be_chosen_and_a_mixed_topic_is_refused(golden, tmp_path: Path) -> None:
     path = write(tmp_path, "ros1", "/imu", "/both")
     with golden.refused(SeveralTopics):
         open_sheet(path)
@@ -125,7 +124,7 @@ def test_a_bag_without_its_schema_or_under_another_name_is_refused(tmp_path: Pat
         open_sheet(tmp_path / "empty")
 
 
-def test_a_ros_2_bag_without_its_metadata_is_refused_with_a_remedy(golden: Golden, tmp_path: Path) -> None:
+def test_a_ros_2_bag_without_its_metadata_is_refused_with_a_remedy(golden, tmp_path: Path) -> None:
     folder = tmp_path / "unfinished"
     folder.mkdir()
     (folder / "unfinished_0.db3").write_bytes(b"SQLite format 3\0")

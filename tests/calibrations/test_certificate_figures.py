@@ -19,7 +19,6 @@ from calibrations.presentation.certificate.results import _explain_wider_interva
 from calibrations.presentation.certificate.terms import in_si, name, names, term
 from tests.calibrations import turned
 from tests.calibrations.certified import LIMITS, before, certificate, fitted, table
-from tests.golden.messages import Golden
 
 BY_NAME = {o.name: o for o in certificate().figures.outcomes}
 
@@ -175,7 +174,7 @@ def test_units_are_converted_to_si(unit: str, factor: float, si: str) -> None:
     assert in_si(unit, 9.81) == (pytest.approx(factor), si)
 
 
-def test_what_cannot_be_certified_is_refused(golden: Golden) -> None:
+def test_what_cannot_be_certified_is_refused(golden) -> None:
     with golden.refused(DataError):
         in_si("furlong", 9.81)
     shaken = fit(read_model("linear"), table())

@@ -12,7 +12,6 @@ from calibrations.geometry.clipped_turns import find_clipped_output, find_clippe
 from calibrations.geometry.turns import make_turns
 from calibrations.table import Table
 from tests.calibrations.test_turns import BIAS, GAINS, samples, table
-from tests.golden.messages import Golden
 
 
 def clipped(turns: tuple[int, ...], limit_deg_s: float = 60.0) -> Table:
@@ -45,7 +44,7 @@ def test_turns_without_a_limit_raise_no_doubt() -> None:
     assert make_turns(data).n == 12
 
 
-def test_too_few_turns_are_refused_with_the_number_of_clipped_ones(golden: Golden) -> None:
+def test_too_few_turns_are_refused_with_the_number_of_clipped_ones(golden) -> None:
     data = clipped(tuple(range(12)), limit_deg_s=20.0)
     with golden.refused(TooFewRows):
         make_turns(data)

@@ -27,7 +27,6 @@ from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations.fitted import LINEAR, PHYSICAL, model
 from tests.calibrations.synthetic import components, turns
-from tests.golden.messages import Golden
 
 ORIGIN = Origin("made", "made.yaml", "0" * 64, "inertial-rig", "2026-01-01")
 THERMAL = {"temperature-bias": {"slope": (0.001, -0.002)}, "temperature-scale": {"slope": (3e-4, -2e-4)}}
@@ -312,7 +311,7 @@ def test_what_is_not_contractive_is_refused_with_the_way_out() -> None:
     assert made.bound.q > 0.2
 
 
-def test_a_scale_factor_that_vanishes_beside_the_bias_is_refused(golden: Golden) -> None:
+def test_a_scale_factor_that_vanishes_beside_the_bias_is_refused(golden) -> None:
     tiny = model({"bias": {"bias": (1e12, 1e12)}, "scale-factor": {"scale": (1e-6, 1e-6)}}, std=1.0)
     with golden.refused(ModelError):
         invert_model(tiny)
@@ -372,12 +371,12 @@ def test_an_effect_of_the_users_own_file(tmp_path: Path) -> None:
     assert made["bad"].forward.fates[-1].why == "its function uses np.round"
 
 
-def test_a_model_of_noise_alone_has_no_inverse(golden: Golden) -> None:
+def test_a_model_of_noise_alone_has_no_inverse(golden) -> None:
     with golden.refused(ModelError):
         invert_model(model({"white-noise": {p.name: 0.1 for p in catalogue()["white-noise"].parameters}}))
 
 
-def test_a_model_without_values_is_refused(golden: Golden) -> None:
+def test_a_model_without_values_is_refused(golden) -> None:
     with golden.refused(ModelError):
         invert_model(read_model("linear"))
     with golden.refused(ModelError):

@@ -10,7 +10,6 @@ from scipy.stats import norm
 from calibrations.analyses.control_chart import D2, D4, EWMA_WEIGHT, Chart, control_chart
 from calibrations.criteria import EWMA_LIMIT, LIMIT_SIGMAS
 from calibrations.errors import TooFewRows
-from tests.golden.messages import Golden
 
 # NIST/SEMATECH e-Handbook 6.3.2.2, flow rates of ten batches
 FLOWRATE = (49.6, 47.6, 49.9, 51.3, 47.8, 51.2, 52.6, 52.4, 53.6, 52.1)
@@ -98,6 +97,6 @@ def test_runs_that_agree_better_than_their_noise_set_no_narrower_limits() -> Non
     assert chart(same, least_sigma=1e-6).verdict == "in control"
 
 
-def test_a_chart_of_one_run_is_refused(golden: Golden) -> None:
+def test_a_chart_of_one_run_is_refused(golden) -> None:
     with golden.refused(TooFewRows):
         control_chart([1.0])

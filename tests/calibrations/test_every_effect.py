@@ -16,7 +16,6 @@ from calibrations.fitting.problem_kinds import make_problem
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations import shaken, synthetic, test_turns
-from tests.golden.messages import Golden
 
 NOISE = {name: effect for name, effect in catalogue().items() if effect.kinds == ("still",)}
 SIGNAL = {name: effect for name, effect in catalogue().items() if name not in NOISE}
@@ -122,7 +121,7 @@ def test_is_refused_where_its_columns_are_missing(effect: Effect) -> None:
     assert still is None if effect.name in NOISE else "is not defined for still" in str(still)
 
 
-def test_unknown_effect_names_the_nearest(golden: Golden) -> None:
+def test_unknown_effect_names_the_nearest(golden) -> None:
     with golden.refused(UnknownName):
         find("hysteresys", catalogue())
 
@@ -253,6 +252,6 @@ def test_a_file_that_is_not_an_effect(tmp_path: Path, text: str, says: str) -> N
     assert "wrong.py" in str(error.value)
 
 
-def test_folder_of_own_effects_must_exist(golden: Golden, tmp_path: Path) -> None:
+def test_folder_of_own_effects_must_exist(golden, tmp_path: Path) -> None:
     with golden.refused(ModelError):
         catalogue(tmp_path / "nowhere")

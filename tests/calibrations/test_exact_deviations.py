@@ -10,7 +10,6 @@ import pytest
 from calibrations.errors import DataError
 from calibrations.noise.deviations import deviations
 from tests.calibrations.exact_deviations import exact_deviations
-from tests.golden.messages import Golden
 
 DATA = Path(__file__).parents[1] / "data" / "allantools"
 STABLE32 = {"adev": "allan", "oadev": "overlapping", "mdev": "modified", "hdev": "separate-hadamard", "totdev": "total"}
@@ -84,7 +83,7 @@ def test_a_time_that_is_too_long_has_none() -> None:
     assert np.isfinite(found).tolist() == [True, False, False]
 
 
-def test_samples_that_are_no_numbers_and_a_time_of_zero_are_refused(golden: Golden) -> None:
+def test_samples_that_are_no_numbers_and_a_time_of_zero_are_refused(golden) -> None:
     with golden.refused(DataError):
         deviations(np.array([1.0, 2.0, np.nan]), [1])
     with golden.refused(DataError):

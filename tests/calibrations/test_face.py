@@ -14,7 +14,6 @@ from calibrations.effects import Values
 from calibrations.errors import DataError, MissingColumn, ModelError
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
-from tests.golden.messages import Golden
 
 
 def force_and_table() -> tuple[Array, Table]:
@@ -63,7 +62,7 @@ def test_a_fit_compensates_columns_by_name_and_refuses_what_does_not_fit() -> No
         cal.compensate(cal.compare(data, "linear"), data)
 
 
-def test_an_effect_of_ones_own_is_refused_by_its_name(golden: Golden) -> None:
+def test_an_effect_of_ones_own_is_refused_by_its_name(golden) -> None:
     class Bias(cal.Effect):
         shift = cal.Parameter("{out}", typical=0.1)
 

@@ -16,7 +16,6 @@ from calibrations.model.parameters import Layout
 from calibrations.table import Table
 from tests.calibrations import synthetic
 from tests.calibrations.test_effects_recovered import hysteretic
-from tests.golden.messages import Golden
 
 COLUMNS = synthetic.turns((90, 30, 150), step_deg=15)
 A_X, A_Y, A_Z = synthetic.components(COLUMNS)
@@ -137,7 +136,7 @@ def test_a_time_constant_is_fitted_although_its_amplitude_begins_at_zero() -> No
     assert found.pooled_excess < 1.2
 
 
-def test_fewer_rows_than_parameters(golden: Golden) -> None:
+def test_fewer_rows_than_parameters(golden) -> None:
     few = Table.from_columns(
         "poses", {"alpha_deg": [90.0] * 2, "beta_deg": [0.0, 180.0], "vx_v": [3.5, 1.5]}, source="few"
     )
@@ -145,7 +144,7 @@ def test_fewer_rows_than_parameters(golden: Golden) -> None:
         fit(read_model("linear"), few)
 
 
-def test_only_poses_and_positions_are_fitted(golden: Golden) -> None:
+def test_only_poses_and_positions_are_fitted(golden) -> None:
     still = Table.from_columns("still", {"t_s": [0.0, 1.0]}, source="still.csv")
     with golden.refused(ModelError):
         fit(read_model("linear"), still)

@@ -17,7 +17,6 @@ from calibrations.importing.binary import open_sheet
 from calibrations.importing.foreign import import_sheet
 from calibrations.importing.topics import SeveralTopics
 from tests.foreign_files import read_foreign
-from tests.golden.messages import Golden
 
 N = 30
 DIRECTIONS = np.random.default_rng(2).normal(size=(N, 3))
@@ -136,7 +135,7 @@ def test_a_dataflash_log_gives_its_accelerometer_and_tells_the_correction(tmp_pa
         open_sheet(path, "ATT")
 
 
-def test_a_format_without_a_length_is_refused(golden: Golden, tmp_path: Path) -> None:
+def test_a_format_without_a_length_is_refused(golden, tmp_path: Path) -> None:
     """pymavlink would read the same bytes for ever."""
     path = tmp_path / "00000012.BIN"
     for name in (b"ATT\0", bytes(4)):

@@ -17,7 +17,6 @@ from calibrations.importing.units import ColumnMapping
 from calibrations.table import Table
 from tests.calibrations.synthetic import components, poses, turns
 from tests.foreign_files import read_foreign
-from tests.golden.messages import Golden
 
 THREE = [ColumnMapping(name, str(k)) for k, name in enumerate(("ax", "ay", "az"), start=1)]
 
@@ -143,12 +142,12 @@ def test_what_is_wrong_is_said_with_its_place(tmp_path: Path, text: str, columns
 
 
 @pytest.mark.parametrize("text", ["vx_v", "=Vout", "vx_v=", "vx_v=:mV", ""])
-def test_a_column_is_given_as_name_and_theirs(golden: Golden, text: str) -> None:
+def test_a_column_is_given_as_name_and_theirs(golden, text: str) -> None:
     with golden.refused(DataError):
         ColumnMapping.parse(text)
 
 
-def test_a_missing_column_is_named_with_the_way_out(golden: Golden, tmp_path: Path) -> None:
+def test_a_missing_column_is_named_with_the_way_out(golden, tmp_path: Path) -> None:
     for kind in (None, "poses"):
         with golden.refused(MissingColumn):
             read(tmp_path, "alpha_deg,beta_deg,output\n1,2,3\n", kind=kind)

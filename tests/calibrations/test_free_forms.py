@@ -40,7 +40,6 @@ from calibrations.loop import dataset
 from calibrations.model.file import dump_model, parse_model, read_model
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
-from tests.golden.messages import Golden
 from tests.hidden import sampled
 
 ROOT = Path(__file__).parents[2]
@@ -236,13 +235,13 @@ def test_a_model_file_with_an_impossible_form_is_refused(change: dict[str, objec
         parse_model(yaml.safe_dump(document), "broken")
 
 
-def test_a_turn_of_the_base_about_an_unknown_axis_is_refused(golden: Golden) -> None:
+def test_a_turn_of_the_base_about_an_unknown_axis_is_refused(golden) -> None:
     form = Form("tilt-over-time", "about-w", "time", (Spline(0.0, 1.0, 4),), sizes=(1e-3,), shared=True)
     with golden.refused(ModelError):
         check_forms((form,), form.place)
 
 
-def test_an_unknown_place_is_refused_with_the_nearest(golden: Golden) -> None:
+def test_an_unknown_place_is_refused_with_the_nearest(golden) -> None:
     with golden.refused(ModelError):
         place_of("free:own-respons")
 

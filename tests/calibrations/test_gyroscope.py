@@ -17,7 +17,6 @@ from calibrations.loop import discover
 from calibrations.model.file import dump_model, parse_model, read_model
 from calibrations.table import Table
 from tests.calibrations import turned
-from tests.golden.messages import Golden
 
 GYROSCOPE = read_model("gyroscope")
 WHOLE = GYROSCOPE.with_effect(catalogue()["gyro-misalignment"]).with_effect(catalogue()["gyro-g-sensitivity"])
@@ -141,7 +140,7 @@ def test_the_axis_of_a_turn_is_given_or_seen() -> None:
     assert np.array_equal(turn_axes(Table.from_columns("rates", columns | given)), turn_axes(table))
 
 
-def test_what_cannot_be_known_of_the_turns_is_said(golden: Golden) -> None:
+def test_what_cannot_be_known_of_the_turns_is_said(golden) -> None:
     table = turned.gyroscope(seed=0)
     half = {name: table.column(name)[:27] for name in ("rate_deg_s", "gx", "gy", "gz")}
     with golden.refused(DataError):

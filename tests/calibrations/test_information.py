@@ -16,7 +16,6 @@ from calibrations.means.noise import white_only
 from calibrations.model.file import read_model
 from calibrations.table import Table
 from tests.calibrations.synthetic import NOISE_V, components, gauss_markov, poses, turns
-from tests.golden.messages import Golden
 
 PLAN = {"alpha_deg": np.array([90.0, 90, 90, 90]), "beta_deg": np.array([0.0, 90, 180, 270])}
 
@@ -98,7 +97,7 @@ def test_what_the_model_needs_and_nobody_plans_is_held_as_in_the_data() -> None:
         predict_data(settling, PLAN)
 
 
-def test_a_dwell_means_nothing_without_a_sample_rate(golden: Golden) -> None:
+def test_a_dwell_means_nothing_without_a_sample_rate(golden) -> None:
     columns = turns(step_deg=30.0)
     x, y, _ = components(columns)
     with golden.refused(DataError):

@@ -25,7 +25,6 @@ from calibrations.loop import compare, diagnose, discover
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations import turned
-from tests.golden.messages import Golden
 
 FIELD = read_model("field")
 LEFT = {"BB": 0.91, "CF": 0.79, "FG": 1.345, "HC": 0.76, "HC_improved": 0.55, "IB": 1.04, "JG": 1.01}  # per mille
@@ -110,7 +109,7 @@ def turn(n: int = 24) -> Array:
     return np.column_stack([c * x - s * y + 5.0, s * x + c * y - 3.0, np.full(n, 40.0)]) + noise.T
 
 
-def test_too_few_orientations_are_named(golden: Golden) -> None:
+def test_too_few_orientations_are_named(golden) -> None:
     few = coverage_fault(turned.magnetometer(turned.in_iron(5, seed=1)), SOFT_IRON)
     golden.same(few)
     cap = np.random.default_rng(3).normal([0.0, 0.0, 2.0], 0.5, (200, 3))
@@ -148,7 +147,7 @@ def test_harmonics_are_orthonormal_over_the_whole_sphere() -> None:
     assert worst_ratio(u, 2) == pytest.approx(1.0, abs=0.02)
 
 
-def test_a_model_without_a_field_is_refused(golden: Golden) -> None:
+def test_a_model_without_a_field_is_refused(golden) -> None:
     with golden.refused(ModelError):
         fit(read_model("linear"), turned.sap6("BB"))
 

@@ -16,7 +16,6 @@ from calibrations.errors import CalibrationError, ModelError, UnknownName
 from calibrations.model import Estimate, Model, Term
 from calibrations.model.correlations import Correlations
 from calibrations.model.file import MOST, SHIPPED, dump_model, parse_model, read_model, shipped_names
-from tests.golden.messages import Golden
 
 numbers = st.floats(-MOST, MOST)
 words = st.text(st.characters(exclude_categories=("C", "Zl", "Zp")), max_size=20)
@@ -152,7 +151,7 @@ def test_an_error_of_a_model_file_names_the_key(text: str, says: str) -> None:
         parse_model(text, "bad.yaml")
 
 
-def test_unknown_effects_and_models_are_refused_with_a_suggestion(golden: Golden, tmp_path: Path) -> None:
+def test_unknown_effects_and_models_are_refused_with_a_suggestion(golden, tmp_path: Path) -> None:
     with golden.refused(UnknownName):
         parse_model(f"{HEAD}effects: [{{effect: hysterisis}}]", "bad.yaml")
     with golden.refused(UnknownName):

@@ -21,7 +21,6 @@ from calibrations.presentation.charts.motion import evaluation
 from calibrations.presentation.static import png
 from calibrations.table import STANDARD_GRAVITY, Array, Table
 from tests.calibrations import shaken, synthetic
-from tests.golden.messages import Golden
 
 KAPPA = np.array([[0.0, 0.010, 0.0512], [0.012, 0.0, 0.030]])  # x reads 30.6 mg too much at the paper's attitude
 NOISE_V = 155e-6  # density behind which 15 Hz leave the paper's 3.1 mV p-p
@@ -123,7 +122,7 @@ def _two_lines() -> Table:
     return shaken.record(shaken.TWO, 20.0, kappa=KAPPA, noise_v=20e-6, corner_hz=13.0)
 
 
-def test_models_without_values_and_records_without_motion_are_said(golden: Golden) -> None:
+def test_models_without_values_and_records_without_motion_are_said(golden) -> None:
     with golden.refused(ModelError):
         evaluate_motion(shaken_rig(), read_model("linear"), models()[1])
     with golden.refused(DataError):

@@ -8,7 +8,6 @@ from scipy.signal import lfilter
 
 from calibrations.errors import DataError
 from calibrations.motion.reference import Sine, find_sines, fit_four_parameter, strongest_line
-from tests.golden.messages import Golden
 
 RATE = 1000.0
 T = 50.0 + np.arange(4000) / RATE
@@ -69,6 +68,6 @@ def test_no_line_is_found_in_noise() -> None:
     assert strongest_line(T, made(0))[0] == pytest.approx(10.03, abs=0.01)
 
 
-def test_a_sine_fit_of_too_few_samples_is_refused(golden: Golden) -> None:
+def test_a_sine_fit_of_too_few_samples_is_refused(golden) -> None:
     with golden.refused(DataError):
         fit_four_parameter(T[:5], T[:5], 10.0)

@@ -17,7 +17,6 @@ from calibrations.noise.lines import fast_lines
 from calibrations.noise.record import Samples, reduce_record
 from calibrations.noise.samples import hidden_in
 from tests.calibrations import noises
-from tests.golden.messages import Golden
 
 N, SEEDS = 8192, 100
 WHITE, FLICKER, WALK, QUANTUM, MARKOV = (
@@ -171,12 +170,12 @@ def test_records_without_noise_to_analyse_are_refused(samples: np.ndarray, says:
         analysed(samples)
 
 
-def test_a_record_that_is_too_short(golden: Golden) -> None:
+def test_a_record_that_is_too_short(golden) -> None:
     with golden.refused(TooFewRows):
         analysed(np.arange(10.0))
 
 
-def test_behind_a_low_pass_that_lets_through_too_little(golden: Golden) -> None:
+def test_behind_a_low_pass_that_lets_through_too_little(golden) -> None:
     with golden.refused(TooFewRows):
         analysed(np.random.default_rng(1).standard_normal(1000), 1000.0, corner_hz=10.0)
 

@@ -6,7 +6,6 @@ from scipy.signal import lfilter
 
 from calibrations.analyses.noise_floor import hidden_inclination_deg, noise_rms
 from calibrations.errors import DataError
-from tests.golden.messages import Golden
 
 SEEDS = 200
 
@@ -31,7 +30,7 @@ def test_independent_samples_have_the_textbook_error() -> None:
 
 
 @pytest.mark.parametrize("samples", [np.full(100, 2.5), np.array([1.0])])
-def test_a_record_without_noise_is_no_record(golden: Golden, samples: np.ndarray) -> None:
+def test_a_record_without_noise_is_no_record(golden, samples: np.ndarray) -> None:
     with golden.refused(DataError):
         noise_rms([samples])
 

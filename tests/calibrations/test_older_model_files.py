@@ -18,7 +18,6 @@ from calibrations.fitting.fit import evaluate
 from calibrations.importing.foreign import read_csv
 from calibrations.model.file import dump_model, parse_model, read_model
 from tests.docs.markdown import ROOT
-from tests.golden.messages import Golden
 
 SECOND_ORDER_V = {"first": 5e-6}
 FILES = sorted((ROOT / "tests" / "data" / "models").glob("*.yaml"))
@@ -45,7 +44,7 @@ def test_a_value_of_all_axes_becomes_that_of_each_axis() -> None:
     assert model.correlations.submatrix(keys).tolist() == [[1, 1, 0.5], [1, 1, 0.5], [0.5, 0.5, 1]]
 
 
-def test_a_value_of_all_axes_needs_the_axes_of_another_parameter(golden: Golden) -> None:
+def test_a_value_of_all_axes_needs_the_axes_of_another_parameter(golden) -> None:
     text = (
         "schema: rig.model/1\nname: alone\neffects:\n- effect: hysteresis\n  parameters:\n"
         "  - {name: reach, value: 0.15}\n"

@@ -16,7 +16,6 @@ from calibrations.importing.sheet import Sheet, read_sheet
 from calibrations.importing.suggestion import import_command
 from calibrations.importing.units import ColumnMapping, parse_unit, split_unit
 from calibrations.table import Array
-from tests.golden.messages import Golden
 
 
 def laid(content: str) -> Sheet:
@@ -148,7 +147,7 @@ def test_a_message_ends_with_the_command_that_works() -> None:
     assert import_sheet(laid(content), "poses", columns).table.column("vx_v").tolist() == [3.5, 3.4, 3.0]
 
 
-def test_what_is_still_to_be_named_is_said(golden: Golden) -> None:
+def test_what_is_still_to_be_named_is_said(golden) -> None:
     with golden.refused(MissingColumn):
         import_sheet(laid(f"one;two;Vout\n{ROWS}"), None)
 
@@ -226,7 +225,7 @@ def test_only_whole_numbers_that_do_not_run_count_samples(values: str, counted: 
     assert ("n=samples" in proposed(f"alpha_deg;beta_deg;Vx;samples\n{rows}")) is counted
 
 
-def test_what_was_tried_in_vain_is_said_so(golden: Golden) -> None:
+def test_what_was_tried_in_vain_is_said_so(golden) -> None:
     rows = "".join(f"{9.8 * (k == 0)},{9.8 * (k == 1)},{9.8 * (k == 2)}\n" for k in range(3))
     golden.same(advised(f"accX,accY,accZ\n{rows}"))
 

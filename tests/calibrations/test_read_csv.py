@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from calibrations.errors import CalibrationError, DataError
 from calibrations.importing.foreign import parse_csv, read_csv, require_kind, write_csv
 from calibrations.table import Table
-from tests.golden.messages import Golden
 
 HEADER = "alpha_deg,beta_deg,vx_v"
 GOOD = f"{HEADER}\n90,0,3.5\n90,90,2.5\n"
@@ -124,7 +123,7 @@ def test_an_error_of_a_file_names_the_place(text: str, says: str) -> None:
         parse_csv(text, "bad.csv")
 
 
-def test_given_kind_names_its_missing_column(golden: Golden) -> None:
+def test_given_kind_names_its_missing_column(golden) -> None:
     with golden.refused(DataError):
         parse_csv("alpha_deg,beta,vx_v\n1,2,3\n", "bad.csv", kind="poses")
 
@@ -144,7 +143,7 @@ def test_unknown_columns_are_kept() -> None:
     assert table.labels["operator"] == ("Ann", "Bo")
 
 
-def test_unreadable_files_are_refused_with_the_reason(golden: Golden, tmp_path: Path) -> None:
+def test_unreadable_files_are_refused_with_the_reason(golden, tmp_path: Path) -> None:
     with golden.refused(DataError):
         read_csv(tmp_path / "nowhere.csv")
     with golden.refused(DataError):

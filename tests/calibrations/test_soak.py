@@ -15,7 +15,6 @@ from calibrations.presentation.charts.soak import soak_album
 from calibrations.presentation.report.soak import soak_report
 from calibrations.text import estimate_text
 from tests.calibrations.soaks import BLOCK_S, soak_table
-from tests.golden.messages import Golden
 
 FACTS = {"sensor": "a <sensor>", "run": "a night"}
 
@@ -98,7 +97,7 @@ def test_a_short_soak_has_courses_and_no_verdict_on_steady_state(undrawn: None) 
     assert "Too few reversals" in page(found)
 
 
-def test_a_table_without_a_whole_reversal_is_refused(golden: Golden) -> None:
+def test_a_table_without_a_whole_reversal_is_refused(golden) -> None:
     table = soak_table()
     with golden.refused(TooFewRows):
         analyse_soak(table.rows(np.char.startswith(np.array(table.labels["path"]), "hold")))

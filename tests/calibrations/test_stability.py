@@ -11,7 +11,6 @@ from calibrations.presentation.chart import Points
 from calibrations.presentation.charts.history import Life, lives
 from calibrations.presentation.interactive import figure
 from calibrations.presentation.static import png
-from tests.golden.messages import Golden
 
 DAYS = np.arange(8) * 365.0
 
@@ -57,7 +56,7 @@ def test_it_is_due_at_once_where_it_is_beyond_already() -> None:
     assert found.due_days(2.4, 2.501) == DAYS[-1]
 
 
-def test_two_calibrations_tell_no_drift(golden: Golden) -> None:
+def test_two_calibrations_tell_no_drift(golden) -> None:
     for days in ([0.0, 365.0], [5.0, 5.0, 5.0]):
         with golden.refused(TooFewRows):
             fit_stability(days, [1.0] * len(days), [0.1] * len(days))

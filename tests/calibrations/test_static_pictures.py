@@ -18,7 +18,6 @@ from calibrations.presentation.charts.discovery import levels, waterfall
 from calibrations.presentation.smaller_svg import compact
 from calibrations.presentation.static import PictureError, inline, png, save, save_all, svg
 from tests.calibrations.test_pictures import warm, warm_table
-from tests.golden.messages import Golden
 
 
 @pytest.mark.parametrize("make", [svg, png])
@@ -85,7 +84,7 @@ def test_pictures_are_saved_as_svg_and_png(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir() if path.is_file()) == ["a.svg", "b.PNG"]
 
 
-def test_a_picture_that_cannot_be_saved_gives_the_reason(golden: Golden, tmp_path: Path) -> None:
+def test_a_picture_that_cannot_be_saved_gives_the_reason(golden, tmp_path: Path) -> None:
     chart = Chart(((Panel(()),),))
     with golden.refused(PictureError):
         save(chart, tmp_path / "a.pdf")

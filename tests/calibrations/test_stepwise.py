@@ -11,7 +11,6 @@ from calibrations.analyses.stepwise import estimate_stepwise
 from calibrations.errors import DataError, MissingColumn
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
-from tests.golden.messages import Golden
 
 SF, B = {"x": 1.013, "y": 0.987}, {"x": 2.513, "y": 2.474}
 Q, R = (0.031, -0.004, 0.0), (0.021, 0.0017)  # h(0) = 0, as it is a difference from 90 deg; r0 is SF
@@ -141,7 +140,7 @@ def test_says_which_poses_are_missing(
         estimate_stepwise(lacking(columns))
 
 
-def test_needs_poses_and_both_outputs(golden: Golden) -> None:
+def test_needs_poses_and_both_outputs(golden) -> None:
     columns = synthetic.turns()
     one = Table.from_columns("poses", {**columns, "vx_v": columns["beta_deg"]}, source="one.csv")
     with golden.refused(MissingColumn):

@@ -11,7 +11,6 @@ from scipy.signal import lfilter
 from calibrations.errors import DataError
 from calibrations.importing.raw_logs import average_still_positions, is_raw_log, still_intervals
 from calibrations.table import Array, Table
-from tests.golden.messages import Golden
 
 RATE_HZ = 100.0
 NOISE = 2e-3  # g, of a sample
@@ -121,7 +120,7 @@ def test_an_offset_does_not_turn_sway_into_noise() -> None:
 
 
 @pytest.mark.parametrize("motion", ["walk", "swing", "rest"])
-def test_a_log_that_never_rests_or_only_rests_is_refused(golden: Golden, motion: str) -> None:
+def test_a_log_that_never_rests_or_only_rests_is_refused(golden, motion: str) -> None:
     rng = np.random.default_rng(0)
     t_s = np.arange(4000) / RATE_HZ
     swing = np.column_stack([np.sin(rate * t_s) for rate in (0.6, 1.9, 3.1)])

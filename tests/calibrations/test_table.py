@@ -9,7 +9,6 @@ import pytest
 
 from calibrations.errors import DataError, MissingColumn
 from calibrations.table import Table, guess_kind
-from tests.golden.messages import Golden
 
 POSES = {"alpha_deg": [90.0, 90.0, 30.0], "beta_deg": [0.0, 90.0, 0.0], "vx_v": [3.5, 2.5, 3.0]}
 
@@ -37,7 +36,7 @@ def test_impossible_tables_are_refused(kind: str, columns: dict[str, list[float]
         Table.from_columns(kind, columns, source="made.csv")
 
 
-def test_missing_column_names_the_nearest(golden: Golden) -> None:
+def test_missing_column_names_the_nearest(golden) -> None:
     with golden.refused(MissingColumn):
         poses().column("beta_dg")
     with golden.refused(MissingColumn):

@@ -5,7 +5,6 @@ import pytest
 
 from calibrations.analyses.stability import fit_trend
 from calibrations.errors import TooFewRows
-from tests.golden.messages import Golden
 
 
 def test_its_standard_error_is_the_scatter_over_many_records() -> None:
@@ -17,6 +16,6 @@ def test_its_standard_error_is_the_scatter_over_many_records() -> None:
     assert np.sqrt(np.mean(stds**2)) == pytest.approx(slopes.std(), rel=0.05)
 
 
-def test_two_measurements_have_no_trend(golden: Golden) -> None:
+def test_two_measurements_have_no_trend(golden) -> None:
     with golden.refused(TooFewRows):
         fit_trend(np.array([0.0, 1.0]), np.array([1.0, 2.0]))

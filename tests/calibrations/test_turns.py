@@ -13,7 +13,6 @@ from calibrations.geometry.triad import gravity_directions
 from calibrations.geometry.turns import Turns, make_turns
 from calibrations.model.file import read_model
 from calibrations.table import Table
-from tests.golden.messages import Golden
 
 RATE_HZ, REST_S, TURN_S = 100.0, 1.0, 2.0
 BIAS = np.array([0.3, -0.2, 0.1])
@@ -101,7 +100,7 @@ def test_a_subset_of_turns_is_fitted_alike() -> None:
     assert some.residual(rates) == pytest.approx(turns.residual(rates)[:, ::2])
 
 
-def test_turns_without_a_rest_or_too_few_are_refused(golden: Golden) -> None:
+def test_turns_without_a_rest_or_too_few_are_refused(golden) -> None:
     columns = samples(4)
     with golden.refused(TooFewRows):
         make_turns(table(columns))
@@ -111,7 +110,7 @@ def test_turns_without_a_rest_or_too_few_are_refused(golden: Golden) -> None:
         make_turns(table(columns))
 
 
-def test_a_gyroscope_that_does_not_change_is_refused(golden: Golden) -> None:
+def test_a_gyroscope_that_does_not_change_is_refused(golden) -> None:
     columns = samples()
     columns |= {name: np.zeros(len(columns["t_s"])) for name in ("gx", "gy", "gz")}
     with golden.refused(DataError):

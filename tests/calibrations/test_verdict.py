@@ -14,7 +14,6 @@ from calibrations.fitting.fit import Fit
 from calibrations.loop import diagnose
 from calibrations.model.file import read_model
 from tests.calibrations import synthetic
-from tests.golden.messages import Golden
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +99,7 @@ def test_a_verdict_follows_from_the_facts_alone(facts: dict[str, Any], verdict: 
     ],
     ids=["added", "left"],
 )
-def test_a_verdict_without_a_search_names_the_error_and_no_effect(golden: Golden, facts: dict[str, Any]) -> None:
+def test_a_verdict_without_a_search_names_the_error_and_no_effect(golden, facts: dict[str, Any]) -> None:
     judgement = Judgement(model="linear", searched=False, **facts)
     golden.same(f"{judgement.headline}\n{judgement.text}")
 

@@ -11,7 +11,6 @@ from drivers.transport import Address
 from rig.bench import DEFAULT, Bench, drivers, read_bench
 from rig.errors import BenchError
 from rig.instruments.wiring import on_a_network, open_wires
-from tests.golden.messages import Golden
 
 ONE_INPUT = {"vx": 1, "vy": 1}
 ALPHA = {"driver": "oriental_az", "url": "simulated"}
@@ -154,12 +153,12 @@ def test_results_of_the_users_own_procedures_can_have_limits(bench_file: Callabl
     assert read_bench(path).result_limits["mass"] == 2.0
 
 
-def test_a_misspelt_key_is_named_before_what_is_missing_for_it(golden: Golden, bench_file: Callable[..., Path]) -> None:
+def test_a_misspelt_key_is_named_before_what_is_missing_for_it(golden, bench_file: Callable[..., Path]) -> None:
     with golden.refused(BenchError):
         read_bench(bench_file("intruments: {}"))
 
 
-def test_a_file_that_is_not_there_is_said(golden: Golden, tmp_path: Path) -> None:
+def test_a_file_that_is_not_there_is_said(golden, tmp_path: Path) -> None:
     with golden.refused(BenchError):
         read_bench(tmp_path / "bench.yaml")
 
@@ -225,7 +224,7 @@ def test_instruments_that_may_share_a_line_or_a_person(
     assert set(read_bench(bench_file({"instruments": instruments})).instruments) == set(instruments)
 
 
-def test_a_recorded_bench_with_two_roles_on_one_unit_is_not_connected(golden: Golden) -> None:
+def test_a_recorded_bench_with_two_roles_on_one_unit_is_not_connected(golden) -> None:
     twice = {role: part.model_copy(update={"unit": 1}) for role, part in read_bench().instruments.items()}
     with (
         golden.refused(BenchError),

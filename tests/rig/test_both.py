@@ -16,7 +16,6 @@ from rig.errors import RecordError
 from rig.services.load import still_of
 from rig.services.request import Request
 from rig.services.two_runs import fit_both, match_poses
-from tests.golden.messages import Golden
 
 ALPHA, BETA = (each.ravel() for each in np.meshgrid([30.0, 90.0, 150.0], np.arange(0.0, 360.0, 30.0)))
 
@@ -56,7 +55,7 @@ def test_without_a_pose_in_common_there_is_nothing() -> None:
 
 
 @pytest.mark.slow
-def test_a_still_record_and_poses_have_no_model_in_common(golden: Golden, tmp_path: Path) -> None:
+def test_a_still_record_and_poses_have_no_model_in_common(golden, tmp_path: Path) -> None:
     write_csv(table(range(36)), poses := tmp_path / "poses.csv")
     rows = {"vx_v": 2.5 + 1e-3 * np.random.default_rng(1).standard_normal(5000)}
     write_csv(Table.from_columns("still", rows, {"sample_rate_hz": 10.0}, "still"), still := tmp_path / "still.csv")

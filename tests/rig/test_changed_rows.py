@@ -16,7 +16,6 @@ from rig.errors import RecordError
 from rig.record import KeptPose, Record
 from rig.record.measured import table_of
 from rig.record.recover import is_sound, recover
-from tests.golden.messages import Golden
 from tests.rig.test_doctor import PAGE, recorded
 from tests.rig.test_store import begin, block
 
@@ -149,7 +148,7 @@ def test_a_changed_pose_is_named_until_it_is_excluded(tmp_path: Path, statement:
         assert record.poses(run) == [Pose(90, 0), Pose(90, 2)]
 
 
-def test_changed_means_readings_and_columns_are_noticed(golden: Golden, tmp_path: Path) -> None:
+def test_changed_means_readings_and_columns_are_noticed(golden, tmp_path: Path) -> None:
     run = recorded(tmp_path, 1)
     change(tmp_path, "UPDATE dwells SET n = 399")
     change(tmp_path, "UPDATE readings SET value = 0.03")

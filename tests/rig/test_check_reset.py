@@ -10,8 +10,6 @@ from typing import Any
 
 import pytest
 
-from tests.golden.messages import Golden
-
 CONVERTER = {"driver": "labjack_t7", "url": "simulated", "settings": {"channels": {"vx": 0}}}
 TIME_OUT, OVERCURRENT = 0x85, 0x20  # the second needs a power cycle
 
@@ -65,7 +63,7 @@ def test_without_the_option_an_alarm_is_shown_with_the_way_out(check: Callable[.
     assert row(ended.out, "alarm").endswith("reset the alarm with `rig check --reset`, or switch the drive off and on")
 
 
-def test_a_drive_without_an_alarm_is_left_alone(golden: Golden, check: Callable[..., Any]) -> None:
+def test_a_drive_without_an_alarm_is_left_alone(golden, check: Callable[..., Any]) -> None:
     ended = check("--reset")
     assert ended.status == 0
     golden.same(ended.err)

@@ -11,7 +11,6 @@ import pytest
 
 from rig.bench.result_names import names_with_limits
 from rig.record import Record
-from tests.golden.messages import Golden
 
 Rig = Callable[..., Any]
 QUIET = [2.50001, 2.49999] * 5
@@ -113,7 +112,7 @@ def test_a_standard_that_was_measured_once_keeps_no_other_from_its_chart(rig: Ri
     assert {chart["sensor"] for chart in json.loads(ended.out)["charts"]} == {"CS-1"}
 
 
-def test_control_gives_the_reason_if_there_is_no_chart(golden: Golden, rig: Rig) -> None:
+def test_control_gives_the_reason_if_there_is_no_chart(golden, rig: Rig) -> None:
     golden.same(rig("control").err)
     checks(QUIET[:1])
     golden.same(rig("control").err)

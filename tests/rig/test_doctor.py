@@ -18,7 +18,6 @@ from rig.errors import RecordError
 from rig.record import KeptPose, Record
 from rig.record.recover import recover
 from rig.services.health import without_secrets
-from tests.golden.messages import Golden
 from tests.rig.test_store import begin, block
 
 PAGE = 4096
@@ -128,7 +127,7 @@ def _kept(folder: Path, run: str) -> dict[int, KeptPose]:
         return {kept.number: kept for kept in record.kept(run) if kept.number is not None}
 
 
-def test_a_record_is_not_recovered_over_another_and_nothing_out_of_nothing(golden: Golden, tmp_path: Path) -> None:
+def test_a_record_is_not_recovered_over_another_and_nothing_out_of_nothing(golden, tmp_path: Path) -> None:
     recorded(tmp_path / "old", 1)
     with golden.refused(RecordError):
         recover(tmp_path / "old" / "record.db", tmp_path / "old")

@@ -11,7 +11,6 @@ from calibrations.errors import DataError
 from calibrations.importing.foreign import write_csv
 from rig.services.tables import load
 from tests.calibrations.synthetic import components, poses, turns
-from tests.golden.messages import Golden
 from tests.rig.conftest import Ended
 
 ROWS = ["alpha_deg,beta_deg,vx_v,excluded", "90,0,3.5,0", "90,90,9.9,1", "90,180,1.5,0"]
@@ -25,7 +24,7 @@ def test_rows_that_the_file_excludes_are_left_out_and_that_is_said(tmp_path: Pat
     assert said == [f"{file}: 1 of 3 rows are left out: their column `excluded` is not 0."]
 
 
-def test_a_file_cannot_exclude_all(golden: Golden, tmp_path: Path) -> None:
+def test_a_file_cannot_exclude_all(golden, tmp_path: Path) -> None:
     file = tmp_path / "nothing.csv"
     file.write_text("\n".join(row[:-1] + "1" if row[0] == "9" else row for row in ROWS))
     with golden.refused(DataError):

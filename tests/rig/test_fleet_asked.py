@@ -29,7 +29,6 @@ from rig.record import Record
 from rig.web.pages.fleet import progress_text
 from tests.calibrations import turned
 from tests.calibrations.fleets import BETA, sensor
-from tests.golden.messages import Golden
 
 RIPPLE = '''import numpy as np
 
@@ -118,7 +117,7 @@ def test_of_positions_and_rates_no_columns_are_shared(tmp_path: Path) -> None:
     assert statistics == pytest.approx(own, rel=1e-6, abs=1e-3)
 
 
-def test_what_a_fleet_cannot_judge_is_said_with_the_way_to_judge_it(golden: Golden, tmp_path: Path) -> None:
+def test_what_a_fleet_cannot_judge_is_said_with_the_way_to_judge_it(golden, tmp_path: Path) -> None:
     still = Table.from_columns("still", {"t_s": np.arange(9.0), "vx_v": np.arange(9.0)}, source="S.csv")
     for table in (still, turned.ferraris()):
         golden.same(asked(table, "linear", tmp_path)["fault"])

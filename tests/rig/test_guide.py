@@ -34,7 +34,6 @@ from rig.runs.estimates import nearness
 from rig.runs.observer import Progress, RunView
 from rig.runs.runner import Outcome
 from rig.web.pages.run_begin import plan_facts
-from tests.golden.messages import Golden
 from tests.rig.rigging import POSES, small_sweep
 
 TODAY = date(2026, 11, 21)
@@ -299,7 +298,7 @@ def test_a_question_has_its_drawing_once(said: Callable[..., None], rig_home: Pa
     assert (rig_home / "drawings" / "mount-90-down.svg").read_text() == page(Attitude(0, 0, 90, 1))
 
 
-def test_a_terminal_that_closes_is_nobody(golden: Golden, said: Callable[..., None]) -> None:
+def test_a_terminal_that_closes_is_nobody(golden, said: Callable[..., None]) -> None:
     said()
     with guide()[0] as shown_to, golden.refused(NoAnswer):
         shown_to.ask(MOUNTED, "yes")

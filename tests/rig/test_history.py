@@ -19,7 +19,6 @@ from rig.errors import RecordError
 from rig.record import Record
 from rig.services.history import Calibration, History, Value, _most_frequent_kind, history, judge_history, latest
 from rig.services.history_comparison import compare_rigs
-from tests.golden.messages import Golden
 from tests.rig.lives import COLUMNS, calibrated
 
 Rig = Callable[..., Any]
@@ -157,7 +156,7 @@ def test_what_is_no_calibration_is_passed_over_and_said(rig: Rig, years: None) -
     assert "Not used: " in rig("history", "17").err
 
 
-def test_a_date_that_cannot_be_read_is_refused(golden: Golden, refused: Callable[..., str]) -> None:
+def test_a_date_that_cannot_be_read_is_refused(golden, refused: Callable[..., str]) -> None:
     calibrated("19", "last week", 2.5)
     golden.same(refused("history", "19"))
 

@@ -12,7 +12,6 @@ import rig as application
 from rig.errors import RecordError, UnknownRun
 from rig.record import Record
 from rig.record.measured import MeasuredRun
-from tests.golden.messages import Golden
 from tests.rig.conftest import Ended
 
 
@@ -59,7 +58,7 @@ def test_a_sensor_names_its_only_run_and_last_names_the_newest_of_several() -> N
                 record.run(odd)
 
 
-def test_a_misspelt_sensor_is_suggested(golden: Golden) -> None:
+def test_a_misspelt_sensor_is_suggested(golden) -> None:
     with Record() as record:
         of_sensor(record, "soak", "ADXL203", "simulated")
         with golden.refused(UnknownRun):
@@ -79,7 +78,7 @@ def test_the_name_of_a_sensor_of_a_batch_chooses_it_in_its_run() -> None:
                 MeasuredRun.named(record, both)
 
 
-def test_an_empty_record_has_no_last_run(golden: Golden) -> None:
+def test_an_empty_record_has_no_last_run(golden) -> None:
     with Record() as record, golden.refused(UnknownRun):
         record.run("last")
 

@@ -22,7 +22,6 @@ from rig.planning.plan import plan
 from rig.record import Record
 from rig.record.measured import table_of
 from rig.runs.runner import resume, start
-from tests.golden.messages import Golden
 from tests.rig.rigging import Onlooker
 
 MARK_DEG = 5 / 60
@@ -152,7 +151,7 @@ def test_its_plan_takes_as_long_as_the_technician() -> None:
     assert (rehearsed.poses, len(rehearsed.questions)) == (22, 5)  # mounting, and two axes of the level twice
 
 
-def test_a_wire_that_is_a_person_has_no_faults_of_a_wire(golden: Golden, file: Callable[..., str]) -> None:
+def test_a_wire_that_is_a_person_has_no_faults_of_a_wire(golden, file: Callable[..., str]) -> None:
     document = manual()
     document["instruments"]["beta"]["faults"] = [{"what": "silence"}]
     with golden.refused(BenchError):

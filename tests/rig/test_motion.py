@@ -28,7 +28,6 @@ from rig.record import KeptPose, Record
 from rig.record.measured import MeasuredRun
 from rig.runs.runner import Outcome, resume, start
 from rig.services.report import of_run
-from tests.golden.messages import Golden
 from tests.rig.rigging import Onlooker
 from tests.slow import first_fast
 
@@ -105,7 +104,7 @@ def test_what_the_positioner_cannot_do_is_refused_by_the_plan(
         plan(read_bench(), MOTION, parse(MOTION, settings))
 
 
-def test_a_bench_without_its_instruments_is_refused_before_anything_moves(golden: Golden) -> None:
+def test_a_bench_without_its_instruments_is_refused_before_anything_moves(golden) -> None:
     document = read_bench().document()
     document["instruments"]["adc"]["settings"]["channels"].pop("d63")
     with golden.refused(ProcedureError):

@@ -11,7 +11,6 @@ import pytest
 from rig.cli import COMMANDS
 from rig.record import Run
 from rig.services.next_steps import REMEDIES, next_steps, page_steps, results_table
-from tests.golden.messages import Golden
 
 RUN = Run("r1", "poses", "sweep", "complete", {}, {}, {}, "", {}, "", "", None, None, {}, 20)
 
@@ -40,7 +39,7 @@ def failed(*names: str) -> dict[str, dict[str, Any]]:
     ],
     ids=["kinds", "sensors", "unknown", "without limit", "pass"],
 )
-def test_each_verdict_has_its_steps(golden: Golden, results: dict[str, Any]) -> None:
+def test_each_verdict_has_its_steps(golden, results: dict[str, Any]) -> None:
     golden.same(steps(**results))
 
 

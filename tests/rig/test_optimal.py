@@ -26,7 +26,6 @@ from rig.planning.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, o
 from rig.planning.planned import EXCHANGE_S, from_home_s, moves_s
 from rig.record import KeptPose, Record
 from rig.runs.runner import resume, start
-from tests.golden.messages import Golden
 from tests.rig.rigging import Onlooker
 from tests.slow import first_fast
 
@@ -115,7 +114,7 @@ def test_too_many_and_too_few_are_refused(poses: int, told: str) -> None:
 
 
 @pytest.mark.parametrize("inclination", ["0", "90"])
-def test_a_sweep_that_tells_nothing_is_no_standard(golden: Golden, inclination: str) -> None:
+def test_a_sweep_that_tells_nothing_is_no_standard(golden, inclination: str) -> None:
     with golden.refused(PlanError):
         chosen("physical", inclinations_deg=inclination)
 

@@ -6,7 +6,6 @@ import pytest
 
 from rig.services.next_steps import result_rows
 from rig.services.page_words import page_step
-from tests.golden.messages import Golden
 
 SUGGESTED = (
     "x.csv: vx_v is missing\nThe names and values suggest this import:\n\n    rig import x.csv --column vx_v=U:mV\n"
@@ -43,7 +42,7 @@ def test_a_page_is_named_in_place_of_its_command(line: str, text: str, to: dict[
     assert (step.text, dict(step.to)) == (text, to)
 
 
-def test_the_unit_is_named_in_place_of_its_option(golden: Golden) -> None:
+def test_the_unit_is_named_in_place_of_its_option(golden) -> None:
     line = 'the column "vx_v" reaches 2500 V\nIf its unit is mV, import it with:\n\n    rig import x.csv --column vx_v=U:mV\n\nIf its unit is V after all, state it: --column vx_v=U:V'  # noqa: E501
     golden.same(page_step(line).text)
 

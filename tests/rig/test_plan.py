@@ -16,7 +16,6 @@ from rig.bench import Bench, read_bench
 from rig.planning.plan import plan
 from rig.record import Record
 from rig.runs.runner import start
-from tests.golden.messages import Golden
 from tests.recorded import command
 from tests.rig.rigging import Onlooker, small_sweep
 
@@ -65,14 +64,14 @@ def test_a_plan_connects_to_nothing(rig_home: Path, monkeypatch: pytest.MonkeyPa
     assert not rig_home.exists()
 
 
-def test_a_move_beyond_its_limits_is_refused_as_the_stage_would(golden: Golden) -> None:
+def test_a_move_beyond_its_limits_is_refused_as_the_stage_would(golden) -> None:
     document = read_bench().document()
     document["instruments"]["alpha"]["settings"]["limits_deg"] = [-10, 80]
     with golden.refused(LimitError):
         plan(Bench.model_validate(document), *small_sweep())
 
 
-def test_an_instrument_that_the_bench_lacks_is_named(golden: Golden) -> None:
+def test_an_instrument_that_the_bench_lacks_is_named(golden) -> None:
     document = read_bench().document()
     del document["instruments"]["adc"]
     with golden.refused(ProcedureError):

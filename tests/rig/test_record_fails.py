@@ -18,7 +18,6 @@ from rig.bench import read_bench
 from rig.errors import RecordError
 from rig.record import KeptPose, Record, file
 from rig.runs.runner import resume, start
-from tests.golden.messages import Golden
 from tests.rig.misbehaving import looking_on
 from tests.rig.rigging import POSES, SMALL_ARGUMENTS, Onlooker, small_sweep
 
@@ -77,7 +76,7 @@ def test_a_record_that_goes_away_stops_the_run(tmp_path: Path) -> None:
         assert resume(record, run.run, Onlooker()).run.state == "complete"
 
 
-def test_a_record_that_is_exchanged_is_not_written_into(golden: Golden, tmp_path: Path) -> None:
+def test_a_record_that_is_exchanged_is_not_written_into(golden, tmp_path: Path) -> None:
     with Record(tmp_path) as record:
         outcome = swept(record, lambda: Path(shutil.copy(record.path, tmp_path / "new")).replace(record.path))
         golden.same(outcome.error)

@@ -17,7 +17,6 @@ from rig.record import Record
 from rig.record.measured import table_of
 from rig.results import Result, documents, read_returned
 from rig.results.evaluate import MODULES
-from tests.golden.messages import Golden
 
 Rig = Callable[..., Any]
 
@@ -48,7 +47,7 @@ def test_a_result_without_a_limit_has_no_verdict() -> None:
 
 
 @pytest.mark.parametrize("given", [3.0, {"value": 3.0}, {"value": "much", "unit": "g"}])
-def test_what_is_no_result_is_said_to_be_none(golden: Golden, given: Any) -> None:
+def test_what_is_no_result_is_said_to_be_none(golden, given: Any) -> None:
     with golden.refused(ProcedureError):
         read_returned("mass", given)
 

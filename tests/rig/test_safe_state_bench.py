@@ -13,7 +13,6 @@ import yaml
 from rig.bench import DEFAULT, read_bench
 from rig.errors import BenchError
 from rig.record import Record
-from tests.golden.messages import Golden
 from tests.rig.rigging import SMALL_ARGUMENTS
 
 
@@ -51,7 +50,7 @@ def test_a_fault_that_cannot_be_is_refused(
     assert said in str(error.value)
 
 
-def test_a_real_instrument_is_given_no_faults(golden: Golden, bench_file: Callable[..., Path]) -> None:
+def test_a_real_instrument_is_given_no_faults(golden, bench_file: Callable[..., Path]) -> None:
     path = bench_file(with_faults("alpha", {"what": "alarm"}, url="serial:/dev/ttyUSB0"))
     with golden.refused(BenchError):
         read_bench(path)

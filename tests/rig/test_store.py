@@ -16,7 +16,6 @@ from rig.errors import RecordError, UnknownRun
 from rig.record import KeptPose, Record
 from rig.record.measured import table_of
 from rig.record.schema import SCHEMA
-from tests.golden.messages import Golden
 
 ANGLES = st.floats(-400, 400)
 POSES = st.builds(
@@ -110,7 +109,7 @@ def test_an_unknown_run_names_the_nearest() -> None:
             record.run(f"{run[:-1]}?")
 
 
-def test_a_run_without_poses_is_no_table_yet(golden: Golden) -> None:
+def test_a_run_without_poses_is_no_table_yet(golden) -> None:
     with Record() as record, golden.refused(RecordError):
         table_of(record, begin(record))
 
@@ -148,13 +147,13 @@ def test_a_file_that_is_no_record_is_left_alone(tmp_path: Path) -> None:
         Record(tmp_path)
 
 
-def test_a_folder_that_cannot_be_made_is_said(golden: Golden, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_said(golden, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with golden.refused(RecordError):
         Record(tmp_path / "file" / "home")
 
 
-def test_a_record_whose_header_asks_for_an_unknown_format_is_damaged(golden: Golden, tmp_path: Path) -> None:
+def test_a_record_whose_header_asks_for_an_unknown_format_is_damaged(golden, tmp_path: Path) -> None:
     Record(tmp_path).close()
     with (tmp_path / "record.db").open("r+b") as file:
         file.seek(44)  # the number of the schema's format, which is at most 4
@@ -163,7 +162,7 @@ def test_a_record_whose_header_asks_for_an_unknown_format_is_damaged(golden: Gol
         Record(tmp_path)
 
 
-def test_a_damaged_block_names_its_pose(golden: Golden) -> None:
+def test_a_damaged_block_names_its_pose(golden) -> None:
     with Record() as record:
         run = begin(record)
         record.keep(run, 0, KeptPose(Pose(90, 0), block([[2.0, 1.0]]), 3.5, 21.5), None)

@@ -25,7 +25,6 @@ from drivers.transport.address import Url
 from procedures.catalogue import find
 from rig.bench import read_bench
 from rig.errors import BenchError
-from tests.golden.messages import Golden
 
 BOMB = "a0: &a0 [x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 10)
@@ -191,7 +190,7 @@ def test_one_time_for_all_poses_is_no_fault_of_the_program(rig: Callable[..., An
     assert ended.status in (0, 1), ended.err
 
 
-def test_an_archive_named_as_an_array_is_refused(golden: Golden, rig: Callable[..., Any], tmp_path: Path) -> None:
+def test_an_archive_named_as_an_array_is_refused(golden, rig: Callable[..., Any], tmp_path: Path) -> None:
     np.savez(tmp_path / "two.npz", a=np.zeros(9))
     (tmp_path / "two.npz").rename(tmp_path / "two.npy")
     ended = rig("noise", str(tmp_path / "two.npy"), "--rate", "100")
@@ -199,7 +198,7 @@ def test_an_archive_named_as_an_array_is_refused(golden: Golden, rig: Callable[.
     golden.same(ended.err)
 
 
-def test_a_model_with_a_scale_of_zero_is_refused(golden: Golden) -> None:
+def test_a_model_with_a_scale_of_zero_is_refused(golden) -> None:
     scale = "- effect: scale-factor\n  parameters:\n  - {name: scale, axis: x, value: 0.0, unit: V/g}\n"
     with golden.refused(ModelError):
         parse_model(PAGE + scale, "zero.yaml")

@@ -14,7 +14,6 @@ from procedures.settings import parse
 from rig.bench import read_bench
 from rig.planning.plan import Plan, plan, stretches, turn_words
 from rig.planning.planned import PlannedDwell, Step
-from tests.golden.messages import Golden
 from tests.rig.rigging import ON_STAGES
 
 Rig = Callable[..., Any]
@@ -78,7 +77,7 @@ def test_a_repeated_command_without_effect_is_no_step(oven_c: str, first: tuple[
     ],
     ids=["counted", "mounted otherwise", "by hand", "there and back"],
 )
-def test_a_stretch_is_described_in_one_line(golden: Golden, poses: list[Pose], on_stages: bool) -> None:
+def test_a_stretch_is_described_in_one_line(golden, poses: list[Pose], on_stages: bool) -> None:
     reach = {"alpha": ((0.0, 90.0), (-180.0, 180.0))} if on_stages else {}
     held = tuple(PlannedDwell(float(k), pose) for k, pose in enumerate(poses))
     (only,) = stretches(Plan("any", {}, (Step(0.0, 1.0, "wait 1 s"),), reach, (), held, 10.0, 0))

@@ -15,7 +15,6 @@ from procedures.session import Pose
 from rig.record import KeptPose, Record
 from rig.runs.runner import resume, start
 from rig.runs.stuck import StuckOutputs
-from tests.golden.messages import Golden
 from tests.rig.enduring import bench_for
 from tests.rig.misbehaving import afflicted, included, short
 from tests.rig.rigging import Onlooker, small_sweep
@@ -106,7 +105,7 @@ def test_a_turn_says_nothing_about_the_noise_at_rest() -> None:
         outputs.require_alive(Pose(0, 180), dwell(DWELL * [3.0], number, "gx"))
 
 
-def test_a_turn_is_judged_by_the_noise_at_rest(golden: Golden) -> None:
+def test_a_turn_is_judged_by_the_noise_at_rest(golden) -> None:
     outputs = StuckOutputs("rates")
     for number in range(8):
         outputs.require_alive(Pose(0, 180.0 * number), dwell(np.round(noise(5.0)(DWELL)), number, "gx"))

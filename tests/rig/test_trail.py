@@ -22,7 +22,6 @@ from rig.services.session import ModelSession, model_session
 from rig.web.calculations import begin
 from tests.browser.measured import ambiguous, hidden, thousand, wandering
 from tests.calibrations.test_common_floor import magnetometer
-from tests.golden.messages import Golden
 
 
 @pytest.fixture
@@ -61,7 +60,7 @@ def test_where_no_column_tells_the_noise_the_error_falls_and_rises_again(tmp_pat
     assert grown.undone().end.pooled_excess == begun.end.pooled_excess == pytest.approx(1.0, abs=0.1)
 
 
-def test_an_effect_that_cannot_be_added_is_refused(golden: Golden, turned: ModelSession) -> None:
+def test_an_effect_that_cannot_be_added_is_refused(golden, turned: ModelSession) -> None:
     with golden.refused(ModelError):
         turned.tried(turned.effects["bias"])
     with golden.refused(ModelError):
