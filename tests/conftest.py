@@ -14,9 +14,13 @@ import sys
 from collections.abc import Generator, Iterator
 from html import escape
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import hypothesis
 import pytest
+
+if TYPE_CHECKING:
+    from tests.golden.messages import Golden
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as `rig` does; numpy is imported after this
 if platform.machine() == "x86_64":  # one arithmetic everywhere: its last bits decide where some fits end
@@ -37,7 +41,9 @@ hypothesis.settings.load_profile("steady")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--update-golden", action="store_true", help="write the transcripts of tests/golden anew")
+    parser.addoption(
+        "--update-golden", action="store_true", help="write the transcripts and messages of tests/golden anew"
+    )
 
 
 @pytest.fixture(autouse=True)
@@ -65,6 +71,14 @@ def rig_home(unchanged_environment: None, tmp_path: Path, monkeypatch: pytest.Mo
 def no_progress(unchanged_environment: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Commands called in this process say no progress, however slow the machine."""
     monkeypatch.setattr("rig.cli.terminal.progress.EVERY_S", 3600.0)
+
+
+@pytest.fixture
+def golden(request: pytest.FixtureRequest, tmp_path: Path) -> Golden:
+    """The messages of this test, as they are in `tests/golden/messages`."""
+    from tests.golden.messages import Golden  # it loads numpy
+
+    return Golden(request.node, tmp_path, request.config.getoption("--update-golden"))
 
 
 @pytest.fixture

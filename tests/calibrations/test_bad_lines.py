@@ -77,10 +77,10 @@ def test_a_damaged_line_among_the_first_does_not_hide_its_column(tmp_path: Path,
     assert imported(tmp_path, given).table.column("ax").shape == (N - 1,)
 
 
-def test_the_strict_policy_refuses_the_first_damaged_line(tmp_path: Path) -> None:
+def test_the_strict_policy_refuses_the_first_damaged_line(golden, tmp_path: Path) -> None:
     given: list[str | bytes] = [*lines()]
     given[1000] = given[1500] = "10,0.1"
-    with pytest.raises(DataError, match=r"line 1001: 2 values for 4 columns \(t_s, ax, ay, az\); correct this line"):
+    with golden.refused(DataError):
         imported(tmp_path, given, "refuse")
 
 
@@ -96,17 +96,17 @@ def test_many_damaged_lines_are_refused_unless_a_person_skips_them(tmp_path: Pat
                                    "line 141 (1 values for 4 columns) and 192 more.")  # fmt: skip
 
 
-def test_more_than_half_is_refused_in_any_case(tmp_path: Path) -> None:
+def test_more_than_half_is_refused_in_any_case(golden, tmp_path: Path) -> None:
     given: list[str | bytes] = [*lines()]
     given[300:2600] = ["?,?,?,?"] * 2300
-    with pytest.raises(DataError, match=r"2300 of 4000 lines are damaged, and at most 50 % are skipped\)"):
+    with golden.refused(DataError):
         imported(tmp_path, given, "skip")
 
 
 def test_an_open_quote_does_not_hide_the_lines_that_it_swallows(tmp_path: Path) -> None:
     given: list[str | bytes] = [*lines()]
     given[1000] = '10.0,"0.1,0.2,0.9'
-    with pytest.raises(DataError, match=r"300\d of 400\d lines are damaged"):
+    with pytest.raises(DataError, match=r"300\d of 400\d "):
         imported(tmp_path, given)
 
 

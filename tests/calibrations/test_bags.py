@@ -66,7 +66,7 @@ def test_a_length_beyond_memory_is_damage(tmp_path: Path) -> None:
     whole = bytearray(path.read_bytes())
     whole[9:17] = b"\xff" * 7 + b"\x3f"
     path.write_bytes(whole)
-    with pytest.raises(DataError, match="is damaged or cut short"):
+    with pytest.raises(DataError, match="damaged"):
         open_sheet(path)
 
 
@@ -92,11 +92,11 @@ def test_an_imu_is_read_with_its_units_and_the_time_of_its_header(storage: str, 
             open_sheet(each, "/imo")
 
 
-def test_two_imus_have_to_be_chosen_and_a_mixed_topic_is_refused(tmp_path: Path) -> None:
+def test_two_imus_have_to_be_chosen_and_a_mixed_topic_is_refused(golden, tmp_path: Path) -> None:
     path = write(tmp_path, "ros1", "/imu", "/both")
-    with pytest.raises(SeveralTopics, match="choose one with --topic"):
+    with golden.refused(SeveralTopics):
         open_sheet(path)
-    with pytest.raises(DataError, match=r"topic /both: has messages of 2 sensors \(frame_id left, right\)"):
+    with golden.refused(DataError):
         open_sheet(path, "/both")
 
 
@@ -124,11 +124,11 @@ def test_a_bag_without_its_schema_or_under_another_name_is_refused(tmp_path: Pat
         open_sheet(tmp_path / "empty")
 
 
-def test_a_ros_2_bag_without_its_metadata_is_refused_with_a_remedy(tmp_path: Path) -> None:
+def test_a_ros_2_bag_without_its_metadata_is_refused_with_a_remedy(golden, tmp_path: Path) -> None:
     folder = tmp_path / "unfinished"
     folder.mkdir()
     (folder / "unfinished_0.db3").write_bytes(b"SQLite format 3\0")
-    with pytest.raises(DataError, match=r"without metadata\.yaml; write it with `ros2 bag reindex`, or name .*_0\.db3"):
+    with golden.refused(DataError):
         open_sheet(folder)
 
 

@@ -97,6 +97,6 @@ def test_runs_that_agree_better_than_their_noise_set_no_narrower_limits() -> Non
     assert chart(same, least_sigma=1e-6).verdict == "in control"
 
 
-def test_a_chart_of_one_run_is_refused() -> None:
-    with pytest.raises(TooFewRows, match="needs at least 2 runs; there are 1"):
+def test_a_chart_of_one_run_is_refused(golden) -> None:
+    with golden.refused(TooFewRows):
         control_chart([1.0])

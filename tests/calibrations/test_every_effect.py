@@ -121,8 +121,8 @@ def test_is_refused_where_its_columns_are_missing(effect: Effect) -> None:
     assert still is None if effect.name in NOISE else "is not defined for still" in str(still)
 
 
-def test_unknown_effect_names_the_nearest() -> None:
-    with pytest.raises(UnknownName, match='unknown effect "hysteresys"; did you mean "hysteresis"'):
+def test_unknown_effect_names_the_nearest(golden) -> None:
+    with golden.refused(UnknownName):
         find("hysteresys", catalogue())
 
 
@@ -189,7 +189,7 @@ def test_a_wrong_member_is_refused_with_the_right_one(tmp_path: Path, right: str
 
 
 def test_a_misspelt_parameter_names_the_nearest() -> None:
-    with pytest.raises(AttributeError, match='no parameter "slpoe"; did you mean "slope"'):
+    with pytest.raises(AttributeError, match=r'"slpoe".*"slope"'):
         Values(slope=np.zeros(3)).slpoe  # noqa: B018
 
 
@@ -252,6 +252,6 @@ def test_a_file_that_is_not_an_effect(tmp_path: Path, text: str, says: str) -> N
     assert "wrong.py" in str(error.value)
 
 
-def test_folder_of_own_effects_must_exist(tmp_path: Path) -> None:
-    with pytest.raises(ModelError, match="the folder of your own effects does not exist"):
+def test_folder_of_own_effects_must_exist(golden, tmp_path: Path) -> None:
+    with golden.refused(ModelError):
         catalogue(tmp_path / "nowhere")

@@ -135,12 +135,12 @@ def test_a_dataflash_log_gives_its_accelerometer_and_tells_the_correction(tmp_pa
         open_sheet(path, "ATT")
 
 
-def test_a_format_without_a_length_is_refused(tmp_path: Path) -> None:
+def test_a_format_without_a_length_is_refused(golden, tmp_path: Path) -> None:
     """pymavlink would read the same bytes for ever."""
     path = tmp_path / "00000012.BIN"
     for name in (b"ATT\0", bytes(4)):
         path.write_bytes(dataflash().replace(b"\x84\x0fATT\0", b"\x84\x00" + name))
-        with pytest.raises(DataError, match=r"the format at byte 356 has records of 0 bytes, which cannot be"):
+        with golden.refused(DataError):
             open_sheet(path)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -74,8 +76,7 @@ def test_a_field_that_follows_the_temperature_is_found_beside_iron() -> None:
 
 def test_where_it_fails_is_told_by_the_side_of_the_sensor() -> None:
     worst = compare(turned.sap6("HC"), FIELD).fails[0]
-    assert worst.text.startswith("side -z: norm is off by +")
-    assert "‰ of the field" in worst.text
+    assert re.match(r"side -z: norm .*\+\d+\S* ‰", worst.text)
 
 
 def test_a_magnet_many_times_stronger_than_the_field_is_found() -> None:
@@ -108,13 +109,13 @@ def turn(n: int = 24) -> Array:
     return np.column_stack([c * x - s * y + 5.0, s * x + c * y - 3.0, np.full(n, 40.0)]) + noise.T
 
 
-def test_how_badly_few_orientations_show_it_is_a_sentence() -> None:
+def test_too_few_orientations_are_named(golden) -> None:
     few = coverage_fault(turned.magnetometer(turned.in_iron(5, seed=1)), SOFT_IRON)
-    assert "a combination of parameters is unknown; turn the sensor about three axes" in str(few)
+    golden.same(few)
     cap = np.random.default_rng(3).normal([0.0, 0.0, 2.0], 0.5, (200, 3))
     cap /= np.linalg.norm(cap, axis=1, keepdims=True)
     some = coverage_fault(turned.magnetometer(turned.in_iron(200, 1, directions=cap)), SOFT_IRON)
-    assert " times less certain than with all directions covered (limit: 10 times); turn" in str(some)
+    golden.same(some)
 
 
 def test_what_a_single_turn_cannot_show_is_said_and_not_fitted() -> None:
@@ -146,8 +147,8 @@ def test_harmonics_are_orthonormal_over_the_whole_sphere() -> None:
     assert worst_ratio(u, 2) == pytest.approx(1.0, abs=0.02)
 
 
-def test_a_model_without_a_field_is_refused() -> None:
-    with pytest.raises(ModelError, match="needs the effect field-strength, and linear has bias, scale-factor"):
+def test_a_model_without_a_field_is_refused(golden) -> None:
+    with golden.refused(ModelError):
         fit(read_model("linear"), turned.sap6("BB"))
 
 

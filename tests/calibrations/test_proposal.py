@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shlex
 from itertools import pairwise
 
@@ -117,7 +116,7 @@ def test_a_displacement_makes_it_motion() -> None:
 def test_a_magnetometer_is_told_by_its_names() -> None:
     content = "MagX (uT),MagY (uT),MagZ (uT)\n12,-3,40\n11,-2,41\n"
     assert proposed(content) == {"mx=MagX (uT):uT", "my=MagY (uT):uT", "mz=MagZ (uT):uT"}
-    with pytest.raises(MissingColumn, match=r"rig import theirs\.csv --kind positions --column mx=MagX:uT"):
+    with pytest.raises(MissingColumn, match="--kind positions --column mx=MagX:uT"):
         import_sheet(laid(content), "positions")
 
 
@@ -148,10 +147,9 @@ def test_a_message_ends_with_the_command_that_works() -> None:
     assert import_sheet(laid(content), "poses", columns).table.column("vx_v").tolist() == [3.5, 3.4, 3.0]
 
 
-def test_what_is_still_to_be_named_is_said() -> None:
-    with pytest.raises(MissingColumn, match=re.escape("put your column's name for YOURS: one, two")) as error:
+def test_what_is_still_to_be_named_is_said(golden) -> None:
+    with golden.refused(MissingColumn):
         import_sheet(laid(f"one;two;Vout\n{ROWS}"), None)
-    assert "--column vx_v=Vout:mV --column alpha_deg=YOURS --column beta_deg=YOURS" in str(error.value)
 
 
 def test_a_mapping_is_needed_where_our_names_are_missing() -> None:
@@ -215,8 +213,7 @@ def test_a_session_in_named_sections_is_rates_and_its_counter_counts_nothing() -
 
 def test_sections_in_which_nothing_turns_are_positions() -> None:
     told = advised(session(turned=False))
-    assert "--kind positions --column ax=acc_x:counts" in told
-    assert "suggest this import:\n" in told
+    assert shlex.split(told.splitlines()[-1])[3:7] == ["--kind", "positions", "--column", "ax=acc_x:counts"]
 
 
 @pytest.mark.parametrize(
@@ -228,11 +225,9 @@ def test_only_whole_numbers_that_do_not_run_count_samples(values: str, counted: 
     assert ("n=samples" in proposed(f"alpha_deg;beta_deg;Vx;samples\n{rows}")) is counted
 
 
-def test_what_was_tried_in_vain_is_said_so() -> None:
+def test_what_was_tried_in_vain_is_said_so(golden) -> None:
     rows = "".join(f"{9.8 * (k == 0)},{9.8 * (k == 1)},{9.8 * (k == 2)}\n" for k in range(3))
-    told = advised(f"accX,accY,accZ\n{rows}")
-    assert "The most likely import fails: theirs.csv: 3 positions; no model has fewer than 4 parameters" in told
-    assert "suggest this import" not in told
+    golden.same(advised(f"accX,accY,accZ\n{rows}"))
 
 
 def columns_of(values: Array) -> str:

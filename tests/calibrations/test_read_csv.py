@@ -123,8 +123,8 @@ def test_an_error_of_a_file_names_the_place(text: str, says: str) -> None:
         parse_csv(text, "bad.csv")
 
 
-def test_given_kind_names_its_missing_column() -> None:
-    with pytest.raises(DataError, match='a table of poses needs the column "beta_deg"; did you mean "beta"'):
+def test_given_kind_names_its_missing_column(golden) -> None:
+    with golden.refused(DataError):
         parse_csv("alpha_deg,beta,vx_v\n1,2,3\n", "bad.csv", kind="poses")
 
 
@@ -143,14 +143,14 @@ def test_unknown_columns_are_kept() -> None:
     assert table.labels["operator"] == ("Ann", "Bo")
 
 
-def test_unreadable_files_are_refused_with_the_reason(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match=r"nowhere\.csv: cannot be read: No such file"):
+def test_unreadable_files_are_refused_with_the_reason(golden, tmp_path: Path) -> None:
+    with golden.refused(DataError):
         read_csv(tmp_path / "nowhere.csv")
-    with pytest.raises(DataError, match="cannot be read: Is a directory"):
+    with golden.refused(DataError):
         read_csv(tmp_path)
     binary = tmp_path / "binary.csv"
     binary.write_bytes(b"\x00\xff\xfe")
-    with pytest.raises(DataError, match="is not text \\(byte 0 is 0x00\\); is it really a CSV file"):
+    with golden.refused(DataError):
         read_csv(binary)
 
 

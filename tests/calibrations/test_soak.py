@@ -97,9 +97,9 @@ def test_a_short_soak_has_courses_and_no_verdict_on_steady_state(undrawn: None) 
     assert "Too few reversals" in page(found)
 
 
-def test_a_table_without_a_whole_reversal_is_refused() -> None:
+def test_a_table_without_a_whole_reversal_is_refused(golden) -> None:
     table = soak_table()
-    with pytest.raises(TooFewRows, match="has no reversal"):
+    with golden.refused(TooFewRows):
         analyse_soak(table.rows(np.char.startswith(np.array(table.labels["path"]), "hold")))
 
 
@@ -151,10 +151,10 @@ def test_the_page_shows_results_limits_and_facts_and_loads_nothing() -> None:
     assert text == page(found, results)
 
 
-def test_the_page_of_a_soak_says_that_the_steady_state_is_not_reached() -> None:
-    text = page(analyse_soak(soak_table(7200.0, drift_v=0.02)))
-    assert "No steady state within" in text
-    assert "steady state not reached" in text
+def test_the_page_of_a_soak_without_a_steady_state_has_no_time_of_it() -> None:
+    found = analyse_soak(soak_table(7200.0, drift_v=0.02))
+    assert found.time_s() is None
+    assert "not reached" in page(found)
 
 
 def test_the_page_says_that_the_ambient_temperature_changed(undrawn: None) -> None:
@@ -163,7 +163,7 @@ def test_the_page_says_that_the_ambient_temperature_changed(undrawn: None) -> No
     warm = type(table).from_columns(
         "poses", {**table.columns, "temperature_c": wandering}, table.constants, "", table.labels
     )
-    assert "ambient temperature was not constant" in page(analyse_soak(warm))
+    assert "not constant" in page(analyse_soak(warm))
 
 
 def test_pictures_are_named() -> None:

@@ -84,12 +84,12 @@ def test_pictures_are_saved_as_svg_and_png(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir() if path.is_file()) == ["a.svg", "b.PNG"]
 
 
-def test_a_picture_that_cannot_be_saved_gives_the_reason(tmp_path: Path) -> None:
+def test_a_picture_that_cannot_be_saved_gives_the_reason(golden, tmp_path: Path) -> None:
     chart = Chart(((Panel(()),),))
-    with pytest.raises(PictureError, match=r'a\.pdf: pictures end in \.png or \.svg, not in "\.pdf"'):
+    with golden.refused(PictureError):
         save(chart, tmp_path / "a.pdf")
-    with pytest.raises(PictureError, match=r"cannot be written: No such file or directory"):
+    with golden.refused(PictureError):
         save(chart, tmp_path / "no" / "a.svg")
     (tmp_path / "file").touch()
-    with pytest.raises(PictureError, match="the folder cannot be made"):
+    with golden.refused(PictureError):
         save_all({"a": chart}, tmp_path / "file", "svg")

@@ -36,10 +36,10 @@ def test_impossible_tables_are_refused(kind: str, columns: dict[str, list[float]
         Table.from_columns(kind, columns, source="made.csv")
 
 
-def test_missing_column_names_the_nearest() -> None:
-    with pytest.raises(MissingColumn, match=r'made\.csv: column "beta_dg" is missing; did you mean "beta_deg"\?'):
+def test_missing_column_names_the_nearest(golden) -> None:
+    with golden.refused(MissingColumn):
         poses().column("beta_dg")
-    with pytest.raises(MissingColumn, match="known: alpha_deg, beta_deg, vx_v"):
+    with golden.refused(MissingColumn):
         poses().column("temperature_c")
 
 

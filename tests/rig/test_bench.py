@@ -153,13 +153,13 @@ def test_results_of_the_users_own_procedures_can_have_limits(bench_file: Callabl
     assert read_bench(path).result_limits["mass"] == 2.0
 
 
-def test_a_misspelt_key_is_named_before_what_is_missing_for_it(bench_file: Callable[..., Path]) -> None:
-    with pytest.raises(BenchError, match=r"key intruments: no such key\. Did you mean 'instruments'"):
+def test_a_misspelt_key_is_named_before_what_is_missing_for_it(golden, bench_file: Callable[..., Path]) -> None:
+    with golden.refused(BenchError):
         read_bench(bench_file("intruments: {}"))
 
 
-def test_a_file_that_is_not_there_is_said(tmp_path: Path) -> None:
-    with pytest.raises(BenchError, match="cannot read the bench file: No such file"):
+def test_a_file_that_is_not_there_is_said(golden, tmp_path: Path) -> None:
+    with golden.refused(BenchError):
         read_bench(tmp_path / "bench.yaml")
 
 
@@ -203,7 +203,7 @@ def test_units_that_cannot_share_a_line_are_refused(
 def test_a_link_to_a_serial_line_is_the_line(bench_file: Callable[..., Path], tmp_path: Path) -> None:
     (tmp_path / "stages").symlink_to("/dev/ttyUSB0")
     instruments = {"alpha": on("serial:/dev/ttyUSB0"), "beta": on(f"serial:{tmp_path}/stages")}
-    with pytest.raises(BenchError, match="alpha and beta are both unit 1"):
+    with pytest.raises(BenchError, match=r"alpha .*beta .*unit 1"):
         read_bench(bench_file({"instruments": instruments}))
 
 
@@ -224,10 +224,10 @@ def test_instruments_that_may_share_a_line_or_a_person(
     assert set(read_bench(bench_file({"instruments": instruments})).instruments) == set(instruments)
 
 
-def test_a_recorded_bench_with_two_roles_on_one_unit_is_not_connected() -> None:
+def test_a_recorded_bench_with_two_roles_on_one_unit_is_not_connected(golden) -> None:
     twice = {role: part.model_copy(update={"unit": 1}) for role, part in read_bench().instruments.items()}
     with (
-        pytest.raises(BenchError, match=r"bench 'simulated rig', key instruments\.beta\.unit: alpha and beta are both"),
+        golden.refused(BenchError),
         open_wires(read_bench().model_copy(update={"instruments": twice})),
     ):
         pass

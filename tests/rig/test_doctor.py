@@ -43,9 +43,9 @@ def test_it_collects_versions_checks_runs_and_the_last_runs_log(rig: Callable[..
     assert b"samples" not in archive.read_bytes()
 
 
-def test_without_any_run_there_is_nothing_to_complain_about(rig: Callable[..., Any], tmp_path: Path) -> None:
-    ended = rig("doctor", "--out", str(tmp_path / "doctor.zip"))
-    assert (ended.status, "there is no run yet" in ended.out) == (0, True)
+def test_without_any_run_all_checks_pass(rig: Callable[..., Any], tmp_path: Path) -> None:
+    ended = rig("doctor", "--out", str(tmp_path / "doctor.zip"), "--json")
+    assert (ended.status, all(check["ok"] for check in json.loads(ended.out)["checks"].values())) == (0, True)
 
 
 @pytest.mark.parametrize("package", ["numpy", "sqlalchemy", "yaml"])
@@ -75,11 +75,6 @@ def test_a_bench_goes_with_it_and_no_secret(rig: Callable[..., Any], tmp_path: P
     assert without_secrets({"a": [{"api_key": "x", "Password": "y", "token": 1, "keys": 2}]}) == {
         "a": [{"api_key": "***", "Password": "***", "token": "***", "keys": 2}]
     }
-
-
-def test_an_archive_that_cannot_be_written_is_said(rig: Callable[..., Any], tmp_path: Path) -> None:
-    ended = rig("doctor", "--out", str(tmp_path / "nowhere" / "doctor.zip"))
-    assert (ended.status, "give another file" in ended.err) == (2, True)
 
 
 def recorded(folder: Path, poses: int = 60) -> str:
@@ -132,10 +127,10 @@ def _kept(folder: Path, run: str) -> dict[int, KeptPose]:
         return {kept.number: kept for kept in record.kept(run) if kept.number is not None}
 
 
-def test_a_record_is_not_recovered_over_another_and_nothing_out_of_nothing(tmp_path: Path) -> None:
+def test_a_record_is_not_recovered_over_another_and_nothing_out_of_nothing(golden, tmp_path: Path) -> None:
     recorded(tmp_path / "old", 1)
-    with pytest.raises(RecordError, match="this record exists already; give a folder without a record"):
+    with golden.refused(RecordError):
         recover(tmp_path / "old" / "record.db", tmp_path / "old")
     (tmp_path / "letters").write_text("no database" * 1000)
-    with pytest.raises(RecordError, match="no row is readable"):
+    with golden.refused(RecordError):
         recover(tmp_path / "letters", tmp_path / "new")

@@ -151,10 +151,10 @@ def test_its_plan_takes_as_long_as_the_technician() -> None:
     assert (rehearsed.poses, len(rehearsed.questions)) == (22, 5)  # mounting, and two axes of the level twice
 
 
-def test_a_wire_that_is_a_person_has_no_faults_of_a_wire(file: Callable[..., str]) -> None:
+def test_a_wire_that_is_a_person_has_no_faults_of_a_wire(golden, file: Callable[..., str]) -> None:
     document = manual()
     document["instruments"]["beta"]["faults"] = [{"what": "silence"}]
-    with pytest.raises(BenchError, match=r"instruments\.beta\.faults\.0\.what: no fault 'silence'"):
+    with golden.refused(BenchError):
         read_bench(Path(file(document)))
 
 

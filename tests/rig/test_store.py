@@ -105,12 +105,12 @@ def test_ids_sort_by_time_and_runs_are_listed_newest_first() -> None:
 def test_an_unknown_run_names_the_nearest() -> None:
     with Record() as record:
         run = begin(record)
-        with pytest.raises(UnknownRun, match=f"Did you mean '{run}'"):
+        with pytest.raises(UnknownRun, match=f"'{run}'"):
             record.run(f"{run[:-1]}?")
 
 
-def test_a_run_without_poses_is_no_table_yet() -> None:
-    with Record() as record, pytest.raises(RecordError, match="has no pose yet"):
+def test_a_run_without_poses_is_no_table_yet(golden) -> None:
+    with Record() as record, golden.refused(RecordError):
         table_of(record, begin(record))
 
 
@@ -147,28 +147,28 @@ def test_a_file_that_is_no_record_is_left_alone(tmp_path: Path) -> None:
         Record(tmp_path)
 
 
-def test_a_folder_that_cannot_be_made_is_said(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_said(golden, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(RecordError, match="check RIG_HOME"):
+    with golden.refused(RecordError):
         Record(tmp_path / "file" / "home")
 
 
-def test_a_record_whose_header_asks_for_an_unknown_format_is_damaged(tmp_path: Path) -> None:
+def test_a_record_whose_header_asks_for_an_unknown_format_is_damaged(golden, tmp_path: Path) -> None:
     Record(tmp_path).close()
     with (tmp_path / "record.db").open("r+b") as file:
         file.seek(44)  # the number of the schema's format, which is at most 4
         file.write(b"\0\0\0\x05")
-    with pytest.raises(RecordError, match=r"the record is damaged; .* \(unsupported file format\)"):
+    with golden.refused(RecordError):
         Record(tmp_path)
 
 
-def test_a_damaged_block_names_its_pose() -> None:
+def test_a_damaged_block_names_its_pose(golden) -> None:
     with Record() as record:
         run = begin(record)
         record.keep(run, 0, KeptPose(Pose(90, 0), block([[2.0, 1.0]]), 3.5, 21.5), None)
         with record.engine.begin() as connection:
             connection.exec_driver_sql("UPDATE blocks SET samples = x'00'")
-        with pytest.raises(RecordError, match="pose 0: its values changed on the disk"):
+        with golden.refused(RecordError):
             list(record.kept(run))
 
 

@@ -135,7 +135,7 @@ def test_that_a_persons_own_program_is_run_is_said(tmp_path: Path, caplog: pytes
     path.write_text('"""mine: nothing.\n"""\ndef mine(rig):\n    pass\n')
     with caplog.at_level(logging.WARNING):
         find("mine", tmp_path)
-    assert f"the program runs {path}, because the bench file names its folder" in caplog.text
+    assert str(path) in caplog.text
 
 
 def test_a_compressed_file_is_no_bomb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -190,16 +190,17 @@ def test_one_time_for_all_poses_is_no_fault_of_the_program(rig: Callable[..., An
     assert ended.status in (0, 1), ended.err
 
 
-def test_an_archive_named_as_an_array_is_refused(rig: Callable[..., Any], tmp_path: Path) -> None:
+def test_an_archive_named_as_an_array_is_refused(golden, rig: Callable[..., Any], tmp_path: Path) -> None:
     np.savez(tmp_path / "two.npz", a=np.zeros(9))
     (tmp_path / "two.npz").rename(tmp_path / "two.npy")
     ended = rig("noise", str(tmp_path / "two.npy"), "--rate", "100")
-    assert (ended.status, "is an archive of several arrays" in ended.err) == (2, True)
+    assert ended.status == 2
+    golden.same(ended.err)
 
 
-def test_a_model_with_a_scale_of_zero_is_refused() -> None:
+def test_a_model_with_a_scale_of_zero_is_refused(golden) -> None:
     scale = "- effect: scale-factor\n  parameters:\n  - {name: scale, axis: x, value: 0.0, unit: V/g}\n"
-    with pytest.raises(ModelError, match="the scale is 0, so the sensor would have no response"):
+    with golden.refused(ModelError):
         parse_model(PAGE + scale, "zero.yaml")
 
 
@@ -207,7 +208,7 @@ ADDRESS = "tcp://me:hush@192.168.1.40:502"
 
 
 def test_an_address_has_no_password() -> None:
-    with pytest.raises(LinkRefused, match=r"'tcp://\*\*\*@192.168.1.40:502' has a user name; remove it"):
+    with pytest.raises(LinkRefused, match=r"'tcp://\*\*\*@192\.168\.1\.40:502'"):
         Url.parse(ADDRESS)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -13,7 +12,7 @@ from procedures.catalogue import find
 from procedures.session import Pose
 from procedures.settings import parse
 from rig.bench import read_bench
-from rig.planning.plan import Plan, Stretch, plan, stretches, turn_words
+from rig.planning.plan import Plan, plan, stretches, turn_words
 from rig.planning.planned import PlannedDwell, Step
 from tests.rig.rigging import ON_STAGES
 
@@ -68,30 +67,21 @@ def test_a_repeated_command_without_effect_is_no_step(oven_c: str, first: tuple[
     assert not any(stretch.also for stretch in others)
 
 
-def test_poses_that_are_counted_are_one_stretch() -> None:
-    poses = [Pose(0, 0, 0, f"still {k}") for k in range(6)]
+@pytest.mark.parametrize(
+    ("poses", "on_stages"),
+    [
+        ([Pose(0, 0, 0, f"still {k}") for k in range(6)], True),
+        ([Pose(0, 0, mount_deg=90.0, flip=1)], True),
+        ([Pose(0, 0, path="+x side up")], False),
+        ([Pose(90, beta) for beta in (0, 90, 180, 90, 0)], True),
+    ],
+    ids=["counted", "mounted otherwise", "by hand", "there and back"],
+)
+def test_a_stretch_is_described_in_one_line(golden, poses: list[Pose], on_stages: bool) -> None:
+    reach = {"alpha": ((0.0, 90.0), (-180.0, 180.0))} if on_stages else {}
     held = tuple(PlannedDwell(float(k), pose) for k, pose in enumerate(poses))
-    assert [s.words for s in stretches(of(held))] == ["alpha 0, beta 0 deg: 6 poses  still 0 to 5"]
-
-
-def test_a_stretch_names_the_mounting_if_it_is_unusual() -> None:
-    (other,) = stretches(of((PlannedDwell(0.0, Pose(0, 0, mount_deg=90.0, flip=1)),)))
-    assert other.words == "alpha 0, beta 0 deg: 1 pose  mounted face down, rotated by 90 deg"
-
-
-def test_a_pose_without_a_stage_is_one_by_hand() -> None:
-    (by_hand,) = stretches(replace(of((PlannedDwell(0.0, Pose(0, 0, path="+x side up")),)), reach={}))
-    assert by_hand.words == "by hand: 1 pose  +x side up"
-
-
-def of(held: tuple[PlannedDwell, ...]) -> Plan:
-    reach = {"alpha": ((0.0, 90.0), (-180.0, 180.0))}
-    return Plan("any", {}, (Step(0.0, 1.0, "wait 1 s"),), reach, (), held, 10.0, 0)
-
-
-def test_the_range_of_angles_is_said_whatever_their_order() -> None:
-    there_and_back = Stretch(0.0, tuple(Pose(90, beta) for beta in (0, 90, 180, 90, 0)), ())
-    assert there_and_back.words == "alpha 90, beta 0 .. 180 deg: 5 poses"
+    (only,) = stretches(Plan("any", {}, (Step(0.0, 1.0, "wait 1 s"),), reach, (), held, 10.0, 0))
+    golden.same(only.words)
 
 
 def test_a_long_plan_is_summed_up_and_a_short_one_printed(rig: Rig) -> None:
