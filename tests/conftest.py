@@ -20,7 +20,7 @@ import hypothesis
 import pytest
 
 if TYPE_CHECKING:
-    from tests.golden.messages import Golden
+    from tests.golden.texts import Golden
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as `rig` does; numpy is imported after this
 if platform.machine() == "x86_64":  # one arithmetic everywhere: its last bits decide where some fits end
@@ -76,7 +76,7 @@ def no_progress(unchanged_environment: None, monkeypatch: pytest.MonkeyPatch) ->
 @pytest.fixture
 def golden(request: pytest.FixtureRequest, tmp_path: Path) -> Golden:
     """The messages of this test, as they are in `tests/golden/messages`."""
-    from tests.golden.messages import Golden  # it loads numpy
+    from tests.golden.texts import Golden  # it loads numpy
 
     return Golden(request.node, tmp_path, request.config.getoption("--update-golden"))
 

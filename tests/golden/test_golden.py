@@ -19,7 +19,7 @@ from rig.cli import Commands
 from rig.cli import rig as group
 from rig.record import Record
 from tests import recorded
-from tests.golden import messages
+from tests.golden import texts
 from tests.golden.transcript import commands, difference, made, placeholder
 
 FOLDER = Path(__file__).parent
@@ -84,11 +84,11 @@ def test_every_command_has_a_transcript() -> None:
     assert called == set(Commands().list_commands(click.Context(group))) - WITHOUT
 
 
-@pytest.mark.parametrize("path", sorted(messages.FOLDER.glob("*.txt")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sorted(texts.FOLDER.glob("*.txt")), ids=lambda path: path.stem)
 def test_every_message_is_one_of_a_test(path: Path) -> None:
-    for head in messages.messages(path.read_text(encoding="utf-8")):
+    for head in texts.messages(path.read_text(encoding="utf-8")):
         file, test = head.split(" ", 1)
-        (source,) = (messages.TESTS / path.stem).rglob(file)
+        (source,) = (texts.TESTS / path.stem).rglob(file)
         name = test.replace("[", " ").split()[0]
         assert re.search(rf"^def {name}\(", source.read_text(encoding="utf-8"), re.MULTILINE), head
 
