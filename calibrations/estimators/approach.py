@@ -132,7 +132,8 @@ class Bank:
         draws = np.sort(random.choice(len(self.weight), n, p=self.weight))
         members, member = np.unique(draws, return_inverse=True)
         sizes, directions = np.linalg.eigh(self.belief.covariance[members, :SLOW, :SLOW])
-        roots = directions * np.sqrt(np.maximum(sizes, 0.0))[:, None, :]
+        # the symmetric root: the eigenvectors' signs, which differ from processor to processor, do not matter to it
+        roots = (directions * np.sqrt(np.maximum(sizes, 0.0))[:, None, :]) @ directions.transpose(0, 2, 1)
         deviations = roots[member] @ random.standard_normal((n, SLOW, 1))
         return np.asarray(self.belief.mean[draws, :SLOW] + deviations[:, :, 0])
 

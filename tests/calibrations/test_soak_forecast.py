@@ -245,3 +245,17 @@ def test_in_an_oven_all_begins_when_it_is_warm() -> None:
     heating = changed(table, "temperature_c", np.where(table.time_s < 3600, 30.0, 45.0))
     cold, warm = forecast_history(table, 0.0), forecast_history(heating, 45.0)
     assert cold["bias-x"].forecasts[0].t_s < 3600 < warm["bias-x"].forecasts[0].t_s
+
+
+def test_a_forecast_does_not_depend_on_the_signs_of_eigenvectors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """These differ from processor to processor."""
+    bank = make_bank(100.0, 0.0, 50.0).after(400.0, 3.0, 1.0).after(900.0, 5.0, 1.0)
+    states = bank.drawn(200)
+    eigh = np.linalg.eigh
+
+    def flipped(matrices: Array) -> tuple[Array, Array]:
+        sizes, directions = eigh(matrices)
+        return sizes, directions * np.where(np.arange(directions.shape[-1]) % 2, 1.0, -1.0)
+
+    monkeypatch.setattr(np.linalg, "eigh", flipped)
+    assert bank.drawn(200) == pytest.approx(states, abs=1e-9)
