@@ -364,8 +364,8 @@ def _check_columns(table: Table) -> None:
     present = [*table.columns, *table.labels]
     unused_columns = [name for name in present if name not in required]
     raise MissingColumn(
-        f'{table.source}: a table of {table.kind} needs the column "{missing[0]}"'
-        f"{_nearest_column(missing[0], unused_columns)}; it has: {', '.join(present)}"
+        f'{table.source}: a table of {table.kind} needs the column "{missing[0]}"; it has: {", ".join(present)}'
+        f"{_nearest_column(missing[0], unused_columns)}"
     )
 
 

@@ -132,10 +132,10 @@ def fit_stability(t_days: Sequence[float], values: Sequence[float], stds: Sequen
     Raises TooFewRows for fewer than three, or for calibrations of one day only.
     """
     t, y, u = (np.asarray(series, dtype=np.float64) for series in (t_days, values, stds))
-    if len(t) < FEWEST_FOR_DRIFT or not np.ptp(t) > 0:
-        raise TooFewRows(
-            f"a drift needs at least {FEWEST_FOR_DRIFT} calibrations at different times; there are {len(t)}"
-        )
+    if len(t) < FEWEST_FOR_DRIFT:
+        raise TooFewRows(f"a drift needs at least {FEWEST_FOR_DRIFT} calibrations; there are {len(t)}")
+    if not np.ptp(t) > 0:
+        raise TooFewRows(f"a drift needs calibrations of different times; all {len(t)} have the same time")
     scatter = float(np.sqrt(between_variance(_line(t - t.mean()), y, u**2, len(t) - 2)))
     variances = u**2 + scatter**2
     middle = float(np.average(t, weights=1 / variances))

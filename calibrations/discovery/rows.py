@@ -304,8 +304,10 @@ def _require_new(fit: Fit, name: str, model: str) -> None:
     estimates = fit.model.estimates(name)
     if all(e.std is None for e in estimates):
         e = estimates[0]
-        axis_words = f" of {e.axis}" if e.axis else ""
-        raise ModelError(f"{name} changes nothing that {model} cannot already describe: {e.name}{axis_words}: {e.why}")
+        parameter = f"{e.name}.{e.axis}" if e.axis else e.name
+        raise ModelError(
+            f'{name} changes nothing that {model} cannot already describe: its parameter "{parameter}", {e.why}'
+        )
 
 
 def _by_axis(fit: Fit, values: Array) -> dict[str, float]:

@@ -394,7 +394,5 @@ def write_csv(table: Table, path: Path | str) -> None:
 def require_kind(table: Table, *kinds: str) -> Table:
     """The table itself. Raises DataError if it is of another kind."""
     if table.kind not in kinds:
-        raise DataError(
-            f"{table.source}: a table of {table.kind}; this needs {' or '.join(kinds)}{nearest(table.kind, kinds)}"
-        )
+        raise DataError(f"{table.source}: a table of {table.kind}; this needs {' or '.join(kinds)}")
     return table
