@@ -160,10 +160,12 @@ def _base_with_forms(result: SearchResult, sizes: Mapping[str, float]) -> tuple[
             variances[component.name] = (FORM_PART * sizes[component.place] / adds) ** 2
     rows = g.indices(variances)
     std = np.sqrt(np.repeat(list(variances.values()), [g.blocks[n].stop - g.blocks[n].start for n in variances]))
-    K = std[:, None] * g.products[np.ix_(rows, rows)] * std + np.eye(len(rows))
-    leak = g.base_inverse @ g.base_products[:, rows] * std
-    base = g.base_inverse @ g.base_with_data - leak @ np.linalg.solve(K, std * g.with_data[rows])
-    covariance = g.base_inverse + leak @ np.linalg.solve(K, leak.T)
+    # By eigenvalues: beside large ones, the smallest ones are lost in rounding, and a solution fails.
+    eigenvalues, directions = np.linalg.eigh(std[:, None] * g.products[np.ix_(rows, rows)] * std)
+    leak = g.base_inverse @ g.base_products[:, rows] * std @ directions
+    shares = 1 / (1 + np.maximum(eigenvalues, 0.0))
+    base = g.base_inverse @ g.base_with_data - leak @ (shares * (directions.T @ (std * g.with_data[rows])))
+    covariance = g.base_inverse + leak @ (shares[:, None] * leak.T)
     return base - result.values.base, covariance * max(1.0, result.ratio**2)
 
 
