@@ -86,7 +86,7 @@ def test_a_cut_file_is_refused_with_a_remedy(name: str, share: float, tmp_path: 
     path = tmp_path / name
     WRITERS[name](path)
     path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
-    with pytest.raises(DataError, match=name):
+    with pytest.raises(DataError, match=f"{name}.*copy it again"):
         read_foreign(path, None)
 
 
@@ -190,7 +190,7 @@ def test_a_value_that_is_missing_is_named_by_its_row(tmp_path: Path) -> None:
 def test_values_beyond_the_limit_are_refused(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     WRITERS[name](tmp_path / name)
     monkeypatch.setattr(topics, "LARGEST_BYTES", 100)
-    with pytest.raises(DataError, match=f"{name}: .* GiB"):
+    with pytest.raises(DataError, match=f"{name}: holds .* GiB of values; the limit is"):
         read_foreign(tmp_path / name, None)
 
 
@@ -198,7 +198,7 @@ def test_zeros_that_unpack_beyond_measurements_are_refused(tmp_path: Path, monke
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file.create_dataset("acc", data=np.zeros((100_000, 3)), compression="gzip")
     monkeypatch.setattr(topics, "SMALL_BYTES", 1 << 16)
-    with pytest.raises(DataError, match=r"a\.h5: .* 50 times"):
+    with pytest.raises(DataError, match=r"a\.h5: the unpacked file is more than 50 times larger"):
         open_sheet(tmp_path / "a.h5")
 
 
@@ -256,5 +256,5 @@ def test_a_damaged_list_of_a_workbook_is_told(tmp_path: Path) -> None:
     path = tmp_path / "a.xlsx"
     excel(path)
     path.write_bytes(path.read_bytes().replace(b"PK\x01\x02", b"PK\x01\x03", 1))
-    with pytest.raises(DataError, match="damaged"):
+    with pytest.raises(DataError, match="is damaged or cut short"):
         open_sheet(path)

@@ -130,7 +130,7 @@ def test_what_the_data_cannot_mean_is_refused(text: str, says: str) -> None:
 
 
 def test_what_is_no_number_is_told_with_its_row() -> None:
-    with pytest.raises(ExpressionError, match=r"column 3: own .* row 8, with a = "):
+    with pytest.raises(ExpressionError, match=r"column 3: own is not a number on row 8, with a = .*keep divisors away"):
         added("a*log(ax)", table(0.0 * X))
 
 
@@ -139,7 +139,7 @@ def test_what_is_no_number_is_told_with_its_row() -> None:
     ["a*exp(exp(exp(beta)))", "a*exp(exp(exp(exp(b*sin(beta)))))", "a*sin(beta*1e300*b)", "a*1e150*sin(beta)"],
 )
 def test_values_that_no_fit_resolves_are_refused(text: str) -> None:
-    with pytest.raises(ModelError, match=r"own: .* [ab] "):
+    with pytest.raises(ModelError, match=r"own: the parameter [ab] changes the output by more than a fit can resolve"):
         add(effect_for("own", text, data := table(0.004 * X**2)), read_model("linear"), data)
 
 

@@ -51,7 +51,7 @@ def test_an_unknown_key_names_what_is_there(key: str, says: str) -> None:
 
 
 def test_a_model_without_values_says_so() -> None:
-    with pytest.raises(UnknownName, match=r"bias\.x"):
+    with pytest.raises(UnknownName, match=r'the model has no value for "bias\.x"'):
         read_model("linear")["bias.x"]
     assert repr(read_model("linear")) == "linear: bias, scale-factor; not fitted yet"
 

@@ -67,8 +67,9 @@ def test_a_drift_that_the_temperature_shares_is_told_with_its_rival() -> None:
     random = np.random.default_rng(1)
     along = np.linspace(20, 22, SAMPLES)
     said = str(found(white(random) + 0.5 * along, temperature_c=np.round(along, 2)).residual_structure)
-    assert "drift of x" in said
-    assert "temperature_c" in said
+    assert "a drift of x by" in said
+    assert "x follows temperature_c by" in said
+    assert "cannot separate it from" in said
 
 
 def test_a_temperature_and_a_step_are_two_things() -> None:

@@ -26,9 +26,17 @@ def poses(**more: list[float]) -> Table:
         ("poses", {}, "the table has no rows"),
         ("poses", {**POSES, "vx_v": [1.0, np.nan, 2.0]}, 'row 2, column "vx_v" is nan, not a finite number'),
         ("poses", {**POSES, "vx_v": [np.inf, np.nan, 2.0]}, 'row 1, column "vx_v" is inf, not a finite number (and 1'),
-        ("poses", {"alpha": [1.0], "beta_deg": [1.0], "vx_v": [1.0]}, 'beta_deg, vx_v; did you mean "alpha"?'),
+        (
+            "poses",
+            {"alpha": [1.0], "beta_deg": [1.0], "vx_v": [1.0]},
+            'the column "alpha_deg"; it has: alpha, beta_deg, vx_v; did you mean "alpha"?',
+        ),
         ("poses", {"alpha_deg": [1.0], "beta_deg": [1.0]}, 'a table of poses needs the column "vx_v"; it has:'),
-        ("positions", {"mx": [1.0], "my": [1.0], "m_z": [1.0]}, 'it has: mx, my, m_z; did you mean "m_z"?'),
+        (
+            "positions",
+            {"mx": [1.0], "my": [1.0], "m_z": [1.0]},
+            'the column "mz"; it has: mx, my, m_z; did you mean "m_z"?',
+        ),
     ],
 )
 def test_impossible_tables_are_refused(kind: str, columns: dict[str, list[float]], says: str) -> None:

@@ -73,7 +73,7 @@ def test_a_damaged_stream_is_an_error(afflicted: Callable[..., Any], what: str, 
 def test_a_stream_without_its_first_packet_is_refused(afflicted: Callable[..., Any]) -> None:
     """It lasts 0.13 s, which is less than bytes may be late: only its number tells."""
     converter, _ = afflicted("labjack_t7", Fault("lost-packet", size=1), rate_hz=4000)
-    with pytest.raises(StreamError, match=r"alpha: packets .*start"):
+    with pytest.raises(StreamError, match="alpha: packets are missing at the start of the record"):
         converter.acquire(1.0)
 
 
@@ -188,7 +188,7 @@ def test_a_level_that_never_stops_talking(afflicted: Callable[..., Any], what: s
 def test_a_stream_that_cannot_be_stopped_is_an_error(afflicted: Callable[..., Any]) -> None:
     converter, _ = afflicted("labjack_t7", Fault("endless"))
     converter.acquire(0.1)
-    with pytest.raises(Refused, match="2605"):
+    with pytest.raises(Refused, match="a stream is running already"):
         converter.acquire(0.1)
 
 
@@ -238,7 +238,7 @@ def test_an_oscillation_that_ends_by_itself_is_noticed_and_a_stop_is_none(afflic
     clock.sleep(1.0)
     positioner.require_steady()
     clock.sleep(3.0)
-    with pytest.raises(StreamError, match=r"alpha: .* x "):
+    with pytest.raises(StreamError, match=r"alpha: the oscillation of x has stopped. Check whether"):
         positioner.require_steady()
     positioner.stop()
     positioner.require_steady()

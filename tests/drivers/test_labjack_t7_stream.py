@@ -144,14 +144,14 @@ def test_scans_are_cut_out_of_packets(device: Callable[[bytes], Link]) -> None:
 def test_a_packet_missing_between_two_blocks_is_noticed(device: Callable[[bytes], Link]) -> None:
     stream = reception(device(packet(0) + packet(2)))
     stream.take(2)
-    with pytest.raises(StreamError, match="after packet 0"):
+    with pytest.raises(StreamError, match="adc: packets are missing after packet 0"):
         stream.take(2)
 
 
 def test_scans_skipped_in_a_later_block_are_noticed(device: Callable[[bytes], Link]) -> None:
     stream = reception(device(packet(0) + packet(1, status=2941)))
     stream.take(2)
-    with pytest.raises(StreamError, match=r" 5 scans \(status 2941 in packet 1"):
+    with pytest.raises(StreamError, match=r"adc: its buffer ran over and it skipped 5 scans \(status 2941 in packet 1"):
         stream.take(1)
 
 

@@ -196,5 +196,5 @@ def test_a_line_of_no_interlock_is_not_looked_at(guarded: Callable[..., labjack_
 
 @pytest.mark.parametrize("lines", [{"a": 23}, {"a": -1}, {"a": 3}, {"a": 4, "b": 4}])
 def test_a_line_that_cannot_be_an_interlock_is_refused(lines: dict[str, int]) -> None:
-    with pytest.raises(ValueError, match=r"interlocks .*0 to 22"):
+    with pytest.raises(ValueError, match="interlocks must be digital lines, 0 to 22, each with one purpose"):
         Settings(power_dio=3, interlocks=lines)

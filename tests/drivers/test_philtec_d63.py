@@ -61,7 +61,7 @@ def test_a_reading_off_the_curve_is_no_number(curve: Curve, volts: Any, side: An
 
 def test_a_side_that_was_not_calibrated() -> None:
     near_only = Curve.from_mapping({key: value for key, value in SHEET.items() if key != "far"})
-    with pytest.raises(SensorFault, match="no far side"):
+    with pytest.raises(SensorFault, match="has no far side"):
         near_only.displacement_um(2.0, "far")
 
 

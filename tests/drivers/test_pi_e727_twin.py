@@ -266,7 +266,7 @@ def test_a_stop_is_safe_in_any_state(positioner: Positioner) -> None:
 
 def test_a_move_without_servo_says_what_to_do(positioner: Positioner) -> None:
     positioner.servo(False)
-    with pytest.raises(Refused, match=r"positioner: MOV 1 .*: error 5.*servo"):
+    with pytest.raises(Refused, match=r"positioner: MOV 1 .*: error 5.*Switch the servo on"):
         positioner.move_to("x", 50.0)
 
 

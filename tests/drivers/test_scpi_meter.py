@@ -179,19 +179,19 @@ def test_an_overload_through_visa_is_refused(visa: Callable[..., driver.Meter]) 
 
 
 def test_readings_with_units_are_refused(visa: Callable[..., driver.Meter]) -> None:
-    with pytest.raises(BadFrame, match=r"'READ\?' .*'\+1\.25E\+00 VDC'"):
+    with pytest.raises(BadFrame, match=r"'READ\?' is '\+1.25E\+00 VDC', not 1 numbers.*units"):
         visa("+1.25E+00 VDC").acquire(0.04)
 
 
 def test_silence_through_visa_is_a_timeout(visa: Callable[..., driver.Meter]) -> None:
     meter = visa()
-    with pytest.raises(LinkTimeout, match=r"adc: .*'\*CLS' .* 0\.05 s .*visa:TCPIP0::meter"):
+    with pytest.raises(LinkTimeout, match=r"adc: no answer to '\*CLS' within 0.05 s on visa:TCPIP0::meter"):
         meter._lines.query("*CLS", 0.05)
 
 
 def test_a_resource_that_is_not_there_is_refused() -> None:
     pytest.importorskip("pyvisa_py")
-    with pytest.raises(LinkRefused, match=r"adc: visa:NOBUS0::1::INSTR: .*pyvisa-info"):
+    with pytest.raises(LinkRefused, match=r"adc: visa:NOBUS0::1::INSTR: cannot be opened.*pyvisa-info"):
         Links(WallClock()).lines("visa:NOBUS0::1::INSTR", "adc")
 
 
@@ -216,11 +216,11 @@ def test_an_address_of_visa_names_its_line() -> None:
 
 
 def test_another_driver_does_not_open_a_visa_resource() -> None:
-    with pytest.raises(LinkRefused, match="scpi_meter"):
+    with pytest.raises(LinkRefused, match="only the driver scpi_meter"):
         Links(WallClock()).link("visa:GPIB0::22::INSTR", "alpha")
 
 
 def test_a_count_of_readings_that_is_no_number_is_a_bad_frame() -> None:
     """Found by fuzzing: -1e9990 is minus infinity."""
-    with pytest.raises(BadFrame):
+    with pytest.raises(BadFrame, match="not a number of readings"):
         scpi_answers(timer=True)(SCPI.replace(b"\n0\n4\n", b"\n-1e9990\n4\n"))

@@ -60,7 +60,7 @@ def test_an_unknown_name_is_answered_with_the_nearest() -> None:
 
 def test_a_file_that_fails_says_where(tmp_path: Path) -> None:
     (tmp_path / "bad.py").write_text("import nonsense_that_is_not_there\ndef bad(rig): ...")
-    with pytest.raises(ProcedureError, match=r"bad\.py: .*ModuleNotFoundError"):
+    with pytest.raises(ProcedureError, match=r"bad.py: cannot load it: ModuleNotFoundError"):
         find("bad", tmp_path)
 
 
@@ -118,5 +118,5 @@ def test_a_value_of_the_wrong_type_is_refused(folder: Path, name: str, text: str
 
 
 def test_an_unknown_setting_is_answered_with_the_nearest(folder: Path) -> None:
-    with pytest.raises(SettingError, match=r"noise-floor .*'dwell'.*'dwell_s'"):
+    with pytest.raises(SettingError, match=r"noise-floor has no setting 'dwell'\. Did you mean 'dwell_s'"):
         parse(find("noise-floor", folder), {"dwell": "1"})

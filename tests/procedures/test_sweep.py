@@ -65,7 +65,7 @@ def test_a_step_that_does_not_divide_half_a_turn_is_refused(step: float) -> None
 
 
 def test_no_inclination_is_refused() -> None:
-    with pytest.raises(SettingError, match="inclinations_deg"):
+    with pytest.raises(SettingError, match="inclinations_deg is empty"):
         list(grid((), 10.0))
 
 

@@ -280,7 +280,7 @@ def test_a_second_start_is_refused_while_a_run_is_in_progress() -> None:
     Status("20261121-093012-000000-ab12", 4711, "sweep", "a bench", phase="running").write()
     with (
         lease(home(), lock("20261121-093012-000000-ab12"), "a test"),
-        pytest.raises(Busy, match="sweep"),
+        pytest.raises(Busy, match="sweep is in progress since"),
     ):
         control.begin("sweep", SMALL, None, attended=False)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -85,7 +84,7 @@ def test_a_damaged_line_of_a_log_is_skipped_or_refused(
     rows = [f"{k / 100:.2f},{0.01 * (k % 7)}" for k in range(500)]
     (work / "still.csv").write_text("\n".join(["t_s,vx_v", *rows[:300], "3.0,,0.1", *rows[300:]]) + "\n")
     arguments = ("import", "still.csv", "--kind", "still")
-    assert "still.csv, line 302: 3 " in refused(*arguments, "--bad-lines", "refuse")
+    assert "still.csv, line 302: 3 values for 2 columns" in refused(*arguments, "--bad-lines", "refuse")
     ended = rig(*arguments)
-    assert " 500 rows" in ended.out
-    assert re.search(r"1 of 501 .* line 302 \(3 .* 2 ", ended.err)
+    assert "500 rows of still" in ended.out
+    assert "1 of 501 lines is damaged and was skipped: line 302 (3 values for 2 columns)" in ended.err

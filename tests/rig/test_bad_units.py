@@ -48,7 +48,7 @@ def test_a_huge_file_of_nothing_is_answered_at_once(
     monkeypatch.setattr("tests.rig.conftest.contents", lambda folder: sorted(folder.iterdir()))  # reads no GiB
     for command in ("fit", "import"):
         said = refused(command, "huge.csv")
-        assert " 1 GiB" in said or "(byte 0 is 0x00)" in said
+        assert "the limit is 1 GiB" in said or "is not text (byte 0 is 0x00)" in said
 
 
 def test_a_compensation_is_not_written_for_a_model_whose_units_differ(refused: Refused, work: Path) -> None:
@@ -75,4 +75,8 @@ def test_an_effect_of_ones_own_takes_no_shipped_name(
     (work / "bias.py").write_text(OWN.replace("class Sag", "class Bias").replace("sag: ", "bias: "))
     bench = str(bench_file({"folders": {"effects": str(work)}}))
     said = refused("diagnose", "good.csv", "--bench", bench)
-    assert f"{work}: bias " in said
+    assert f"{work}: bias is already" in said
+
+
+def test_an_unknown_procedure_names_the_nearest(refused: Refused) -> None:
+    assert "Did you mean 'sweep'?" in refused("run", "swep", "--unattended")

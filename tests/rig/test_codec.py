@@ -51,5 +51,5 @@ def test_a_dwell_takes_less_than_a_byte_a_sample() -> None:
 
 
 def test_damage_is_said_and_not_guessed_over() -> None:
-    with pytest.raises(ValueError, match="damaged"):
+    with pytest.raises(ValueError, match="damaged sample block"):
         decode(b"\0" + encode(np.ones((3, 1))))

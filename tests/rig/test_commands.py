@@ -170,6 +170,10 @@ def test_an_unsupported_format_is_refused_and_nothing_is_written(
     assert said in ended.err
 
 
+def test_a_table_is_not_written_under_the_ending_of_another_format(refused: Callable[..., str]) -> None:
+    assert "give a name that ends in .csv" in refused("export", "good.csv", "--out", "good.xlsx")
+
+
 @pytest.mark.parametrize("words", [("show", "nothing"), ("resume", "nothing"), ("compare", "nothing")])
 def test_looking_for_a_run_makes_no_record(rig: Rig, words: tuple[str, ...]) -> None:
     ended = rig(*words)

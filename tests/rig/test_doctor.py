@@ -44,7 +44,9 @@ def test_it_collects_versions_checks_runs_and_the_last_runs_log(rig: Callable[..
 
 
 def test_without_any_run_all_checks_pass(rig: Callable[..., Any], tmp_path: Path) -> None:
-    ended = rig("doctor", "--out", str(tmp_path / "doctor.zip"), "--json")
+    ended = rig("doctor", "--out", str(tmp_path / "doctor.zip"))
+    assert (ended.status, "there is no run yet" in ended.out) == (0, True)
+    ended = rig("doctor", "--out", str(tmp_path / "again.zip"), "--json")
     assert (ended.status, all(check["ok"] for check in json.loads(ended.out)["checks"].values())) == (0, True)
 
 

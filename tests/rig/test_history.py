@@ -33,6 +33,7 @@ def years() -> None:
 
 
 def test_a_single_calibration_has_no_drift(rig: Rig, years: None) -> None:
+    assert rig("history", "18").out.startswith("18: one calibration, 2024-03-02, model linear\n")
     said = json.loads(rig("history", "18", "--json").out)
     assert len(said["calibrations"]) == 1
     assert {q["drift_per_year"] for q in said["quantities"]} == {None}

@@ -132,7 +132,7 @@ def test_limits_of_a_stage_rule_experiments_out(bench_file: Callable[..., Path])
     parts["alpha"]["settings"]["limits_deg"] = [-95, 95]
     bench = read_bench(bench_file({"instruments": parts}))
     told = Experiment("sweep", {"face": "both"}, (("a", "b"),), "by physics")
-    assert "alpha: 150 deg " in choose_experiment(dispute(temperature=False), told, bench).why
+    assert "alpha: 150 deg is outside its limits" in choose_experiment(dispute(temperature=False), told, bench).why
 
 
 def test_the_oven_warms_over_minutes_and_time_goes_on() -> None:
@@ -157,7 +157,7 @@ def test_commands_print_the_next_experiment(rig: Callable[..., Ended], tmp_path:
     for command in ("diagnose", "discover"):
         said = rig(command, data).out
         assert "    rig run sweep --face both --step-deg 45 --inclinations-deg 90,30,150\n    14:" in said
-        assert " 99.9 %" in said
+        assert "standard deviations, correct with a probability of 99.9 %, from its own data" in said
 
 
 @pytest.mark.usefixtures("rig_home")
@@ -172,7 +172,11 @@ def test_another_bench_than_that_of_the_run_is_named(bench: dict[str, str], told
     assert planned(turned(), Request(run), catalogue(), heard.append).next_experiment.command.startswith(
         "rig run sweep"
     )
-    assert any(run in line and '"ours"' in line for line in heard) == told
+    assert (f'{run} was measured on the bench "ours", but the next' in " ".join(heard)) == told
+
+
+def test_the_same_data_given_twice_is_refused(refused: Callable[..., str]) -> None:
+    assert "good.csv is given twice; give the same data once" in refused("discover", "good.csv", "good.csv")
 
 
 def test_a_command_line_is_made_of_words_that_a_shell_takes() -> None:

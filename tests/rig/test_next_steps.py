@@ -54,8 +54,10 @@ def test_each_verdict_has_its_steps(golden, results: dict[str, Any]) -> None:
 )
 def test_what_is_marginal_is_measured_longer(settings: dict[str, Any], hint: str) -> None:
     text = steps(replace(RUN, settings=settings), noise_rms_x=result("marginal"))
-    assert "noise-rms-x" in text
-    assert f" 4 times the duration{hint} " in text
+    assert (
+        f"Marginal: noise-rms-x reaches across the limit with its uncertainty; 4 times the duration{hint} halves"
+        in text
+    )
 
 
 def test_the_next_command_is_named() -> None:
@@ -66,8 +68,9 @@ def test_the_next_command_is_named() -> None:
 
 
 def test_poses_that_are_left_out_are_named_with_their_reasons() -> None:
-    text = steps(excluded={6: "repeated by hand", 9: "a lorry"})
-    assert "pose 6 (repeated by hand); pose 9 (a lorry)" in text
+    assert "Left out: pose 6 (repeated by hand); pose 9 (a lorry)" in steps(
+        excluded={6: "repeated by hand", 9: "a lorry"}
+    )
 
 
 def test_every_command_that_a_remedy_names_is_there() -> None:

@@ -120,11 +120,10 @@ def test_a_sweep_that_tells_nothing_is_no_standard(golden, inclination: str) -> 
 
 
 def test_people_are_told_what_it_saves_and_how_to_run_it() -> None:
-    found = chosen("physical")
-    text = "\n".join(optimal_lines(found, None))
-    assert "physical, 16 parameters: I-optimal" in text
-    assert f"{found.times_less:.1f} times" in text
-    assert f"rig run sweep --pose-list poses.csv --dwell-s {found.equal.dwell_s:g}" in text
+    text = "\n".join(optimal_lines(chosen("physical"), None))
+    assert "physical, 16 parameters: I-optimal poses" in text
+    assert "times less rig time for the same worst standard error" in text
+    assert f"rig run sweep --pose-list poses.csv --dwell-s {chosen('physical').equal.dwell_s:g}" in text
 
 
 def test_the_printed_run_is_of_the_bench_that_was_planned_on() -> None:

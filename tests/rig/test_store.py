@@ -105,7 +105,7 @@ def test_ids_sort_by_time_and_runs_are_listed_newest_first() -> None:
 def test_an_unknown_run_names_the_nearest() -> None:
     with Record() as record:
         run = begin(record)
-        with pytest.raises(UnknownRun, match=f"'{run}'"):
+        with pytest.raises(UnknownRun, match=f"Did you mean '{run}'"):
             record.run(f"{run[:-1]}?")
 
 

@@ -69,10 +69,10 @@ def test_it_continues_sample_for_sample() -> None:
 
 
 def test_what_all_share_cannot_be_a_sensors_own() -> None:
-    with pytest.raises(BadSetting, match=r"heat .*sensor b"):
+    with pytest.raises(BadSetting, match="heat of sensor b's world is shared by all"):
         batch(heat={"ambient_c": 30.0})
 
 
 def test_an_input_of_no_sensor_is_refused_with_the_nearest() -> None:
-    with pytest.raises(UnknownInput, match=r"'bb' .*'bb\.vx'.*'b'"):
+    with pytest.raises(UnknownInput, match=r"no sensor 'bb' for the input 'bb\.vx'\. Did you mean 'b'"):
         batch().adc_volts(("bb.vx",), 0.0, 1e-3, 1)

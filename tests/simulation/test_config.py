@@ -37,7 +37,7 @@ def test_a_value_must_be_a_number(value: object) -> None:
 
 
 def test_a_section_must_be_a_mapping() -> None:
-    with pytest.raises(SimulationError, match="alpha, beta"):
+    with pytest.raises(SimulationError, match="Give a mapping of alpha, beta"):
         WorldConfig.from_mapping({"stages": 3})
 
 

@@ -36,7 +36,7 @@ def test_a_header_is_16_bytes() -> None:
 
 
 def test_a_missing_packet_is_noticed() -> None:
-    with pytest.raises(StreamError, match="after packet 0"):
+    with pytest.raises(StreamError, match="adc: packets are missing after packet 0"):
         Packets(2, "adc").codes(packet(0, [1, 2]) + packet(2, [3, 4]))
 
 

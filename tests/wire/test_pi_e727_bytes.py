@@ -84,18 +84,18 @@ def test_a_move_waits_until_on_target_and_looks_where_it_is(positioner: Position
 
 def test_arrival_is_measured_not_assumed(positioner: Positioners) -> None:
     exchanges = [*done("MOV 1 40.000000\n"), *told("ONT? 1\n", "1=1\n"), *told("POS? 1\n", "1=40.0210\n")]
-    with pytest.raises(NotSettled, match=r"positioner: x .*40\.021 um .*40\.000 um"):
+    with pytest.raises(NotSettled, match=r"positioner: x is at 40.021 um instead of 40.000 um"):
         positioner(*exchanges).move_to("x", 40.0)
 
 
 @pytest.mark.parametrize("um", [4.99, 95.01, math.inf, math.nan])
 def test_outside_its_limits_nothing_is_sent(positioner: Positioners, um: float) -> None:
-    with pytest.raises(LimitError, match=r"positioner: x = .* 5 \.\. 95 um"):
+    with pytest.raises(LimitError, match=r"positioner: x = .* outside its limits 5 .. 95 um; nothing was sent"):
         positioner().move_to("x", um)
 
 
 def test_an_axis_that_the_bench_does_not_name(positioner: Positioners) -> None:
-    with pytest.raises(LimitError, match=r"positioner: .*'X'.*x, y, z"):
+    with pytest.raises(LimitError, match=r"positioner: there is no axis 'X'; nothing was sent. Use one of x, y, z"):
         positioner().position_um("X")
 
 
@@ -116,7 +116,7 @@ def test_an_error_is_put_into_words(positioner: Positioners, code: int, words: s
 
 
 def test_a_question_that_is_refused_is_not_answered_but_explained(positioner: Positioners) -> None:
-    with pytest.raises(Refused, match=r"positioner: POS\? 1: error 15"):
+    with pytest.raises(Refused, match=r"positioner: POS\? 1: error 15, there is no such axis"):
         positioner(("POS? 1\n", ""), ("ERR?\n", "15\n")).position_um("x")
 
 
@@ -192,13 +192,13 @@ def test_an_oscillation_stays_within_the_limits(
 
 
 def test_a_frequency_above_the_limit_moves_nothing(positioner: Positioners) -> None:
-    with pytest.raises(LimitError, match=r"positioner: 100\.1 Hz .* 100 Hz"):
+    with pytest.raises(LimitError, match=r"positioner: 100.1 Hz is above its limit of 100 Hz; nothing was moved. Ask"):
         positioner(*told(*CYCLE)).oscillate("x", peak_to_peak_um=1.0, frequency_hz=100.1, centre_um=50.0)
 
 
 @pytest.mark.parametrize("frequency_hz", [0.0, -1.0, 1000.1, math.inf, math.nan])
 def test_a_frequency_that_no_wave_table_plays(positioner: Positioners, frequency_hz: float) -> None:
-    with pytest.raises(LimitError, match=" 1000 Hz"):
+    with pytest.raises(LimitError, match=r"the wave tables cannot play .* at most 1000 Hz"):
         positioner(*told(*CYCLE)).oscillate("x", peak_to_peak_um=10.0, frequency_hz=frequency_hz, centre_um=50.0)
 
 
@@ -213,13 +213,13 @@ def test_a_record_has_a_header_and_rows(positioner: Positioners) -> None:
 
 
 def test_an_empty_record_is_an_error(positioner: Positioners) -> None:
-    with pytest.raises(StreamError, match=r"positioner: .* no .* x"):
+    with pytest.raises(StreamError, match=r"positioner: the recorder has no values of x. Let the axis oscillate first"):
         positioner(*told("DRL? 1\n", "1=0\n")).recorded("x")
 
 
 def test_a_record_that_is_too_short(positioner: Positioners) -> None:
     answer = "# SAMPLE_TIME = 0.001 \n# END_HEADER \n1.0 \n2.0\n"
-    with pytest.raises(StreamError, match=r"positioner: .*x .*2 rows .*3"):
+    with pytest.raises(StreamError, match=r"positioner: the record of x has 2 rows instead of 3"):
         positioner(*told("DRL? 1\n", "1=3\n"), *told("DRR? 1 3 1\n", answer)).recorded("x")
 
 

@@ -49,5 +49,5 @@ def test_a_scaled_count_survives_decoding_and_encoding(count: int) -> None:
 
 @pytest.mark.parametrize(("kind", "value"), [("int16", 40000), ("uint32", -1), ("float32", 1e39)])
 def test_a_value_that_does_not_fit_is_named(kind: Kind, value: float) -> None:
-    with pytest.raises(ValueError, match=r"register 0x1001 \(set point\)"):
+    with pytest.raises(ValueError, match=r"does not fit into register 0x1001 \(set point\)"):
         Register(0x1001, kind, "set point").encode(value)
