@@ -20,7 +20,7 @@ NEXT_FORM = 0.05  # of a place's variance: the least that a second form must exp
 LEAST_NEEDED = 0.02  # of a place's variance: the least that the other forms must lose without this one
 NAMED = 0.9  # of a place's variance: the least that the forms must explain together
 NAMED_ALONE = 0.7  # the same at a place of one catalogue effect: the place itself tells the mechanism
-NAMED_LIKE_NO_OTHER = 0.8  # the same where the curve resembles no other effect of its place: half of a second wave
+NAMED_LIKE_NO_OTHER = 0.8  # the same for the only effect of its place that the curve resembles at all
 MOST_FORMS = 2  # forms, at most, that only approximate a curve
 MOST_NAMES = 3  # causes of one curve, at most: four forms, each with a shape of its own, approximate any curve
 LEAST_SIZE = 0.6  # noise floors: a smaller place is a refinement
@@ -212,11 +212,10 @@ def _name_effects(
     if share >= NAMED and len(causes) <= MOST_NAMES:
         return causes, share
     narrow = [cause for cause, comps in forms.items() if not any(comp.contains in forms for comp in comps)]
-    resembling = [_select_causes([cause], acting_causes, (), curve, options_of) for cause in narrow]
-    resembling = [(named, share_alone) for named, share_alone in resembling if named]
-    if len(resembling) == 1 and resembling[0][1] >= (NAMED_ALONE if len(narrow) == 1 else NAMED_LIKE_NO_OTHER):
-        return resembling[0]
-    return (), share
+    each_alone = [_select_causes([cause], acting_causes, (), curve, options_of) for cause in narrow]
+    resembling = [(named, share_alone) for named, share_alone in each_alone if named]
+    least = NAMED_ALONE if len(narrow) == 1 else NAMED_LIKE_NO_OTHER
+    return resembling[0] if len(resembling) == 1 and resembling[0][1] >= least else ((), share)
 
 
 def _forms_by_cause(result: SearchResult, place: str, names: Sequence[str]) -> dict[str, list[Component]]:
