@@ -43,6 +43,7 @@ FIRST, LAST = 5, 3  # rows of a long table that a terminal and a notebook show
 LENGTHS = ((7200.0, 3600.0, "h"), (180.0, 60.0, "min"), (-1.0, 1.0, "s"))  # of a time axis: longer than, unit, its name
 HOLD = "hold "  # the paths of a soak, which switches the sensor on
 LARGEST = 1e30  # in any unit: measurements are smaller, and the fourth power must still be a number
+IN_MEMORY = "the table"  # how messages call a table that was read from no file
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,7 +53,7 @@ class Table:
     kind: str
     columns: Mapping[str, Array]
     constants: Mapping[str, Constant] = field(default_factory=dict)
-    source: str = ""
+    source: str = IN_MEMORY
     labels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     numbers: NDArray[np.intp] | None = None  # of the rows in what they were taken from; None: 0, 1, 2 ...
     noise: Mapping[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)  # by axis: `known_noise`
@@ -63,7 +64,7 @@ class Table:
         kind: str,
         columns: Mapping[str, Iterable[float]],
         constants: Mapping[str, Constant] | None = None,
-        source: str = "",
+        source: str = IN_MEMORY,
         labels: Mapping[str, tuple[str, ...]] | None = None,
     ) -> Table:
         """A checked table. Raises DataError when it cannot be a table of this kind."""
@@ -116,7 +117,7 @@ class Table:
             f"{name}: {f'{value:.6g}' if isinstance(value, float) else value}" for name, value in self.constants.items()
         ]
         constants_text = f"; {', '.join(texts)}" if texts else ""
-        return f"{self.n} rows of {self.kind}{f', {self.source}' if self.source else ''}{constants_text}"
+        return f"{self.n} rows of {self.kind}{f', {self.source}' if self.source != IN_MEMORY else ''}{constants_text}"
 
     def _shown(self) -> tuple[list[str], list[list[str]]]:
         """Head and rows of a view: all rows, or the first and last of many."""

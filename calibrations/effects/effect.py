@@ -85,9 +85,13 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Constant:
-    """A reference value, such as the mean temperature: computed from the first table, then kept with the model."""
+    """A reference value, such as the mean temperature: computed from the first table, then kept with the model.
+
+    `assumed` is the value in model files with parameters that do not give it, as they were written before it existed.
+    """
 
     of: Callable[[Table], float]
+    assumed: float | None = None
 
 
 class Values(dict[str, Array]):
@@ -126,6 +130,7 @@ class Effect:
     name: str
     parameters: tuple[Parameter, ...] = ()
     constants: Mapping[str, Callable[[Table], float]] = {}
+    former_constants: Mapping[str, float] = {}  # constants that model files of an earlier version do not have
     places: frozenset[str] = frozenset()  # those of HOOKS where it acts
     expression: str = ""  # where one line of arithmetic defines it; kept in model files
 
@@ -157,7 +162,10 @@ class Effect:
             *cls.parameters,
             *(replace(v, name=m) for m, v in members.items() if isinstance(v, Parameter)),
         )
-        cls.constants = {**cls.constants, **{m: v.of for m, v in members.items() if isinstance(v, Constant)}}
+        constants = {m: v for m, v in members.items() if isinstance(v, Constant)}
+        cls.constants = {**cls.constants, **{m: v.of for m, v in constants.items()}}
+        assumed = {m: v.assumed for m, v in constants.items() if v.assumed is not None}
+        cls.former_constants = {**cls.former_constants, **assumed}
         cls.places = frozenset(hook for hook in HOOKS if getattr(cls, hook) is not getattr(Effect, hook))
         if "Symptom" in (cls.__doc__ or ""):
             for part, text in _sections(cls.__doc__ or "").items():

@@ -46,10 +46,11 @@ def has_times(table: Table) -> bool:
     return table.n > 1 and "t_s" in table and bool(np.ptp(table.time_s) > 0)
 
 
-def follows_level(table: Table, names: Sequence[str], power: int = 1) -> float:
+def follows_level(table: Table, names: Sequence[str], power: int = 1, scales: bool = False) -> float:
     """1.0 where the outputs of poses follow the level of a column, one or one an axis, more closely than its readings.
 
     Else 0.0. Smooth functions of the direction of gravity are fitted too, because other effects may follow them.
+    `scales`: the column changes the sensitivity, and the outputs follow it in proportion to themselves.
     """
     if table.kind != "poses" or any(name not in table or not level_is_known(table, name, power) for name in names):
         return 0.0
@@ -58,7 +59,9 @@ def follows_level(table: Table, names: Sequence[str], power: int = 1) -> float:
     def left(columns: Sequence[Array]) -> float:
         total = 0.0
         for k, output in enumerate(table.outputs.T):
-            X = np.column_stack([smooth, columns[k % len(columns)]])
+            column = columns[k % len(columns)]
+            factor = output - output.mean() if scales else 1.0
+            X = np.column_stack([smooth, (column - column.mean()) * factor])
             X /= np.maximum(np.linalg.norm(X, axis=0), np.finfo(float).tiny)
             total += float(np.sum((output - X @ np.linalg.lstsq(X, output, rcond=1e-9)[0]) ** 2))
         return total
@@ -100,13 +103,14 @@ def _smooth(logged: Array) -> tuple[Array, float, float]:
     return np.asarray(values), float(np.hypot(smooth.error, of_line)), smooth.change_error
 
 
-def sensor_temperature_c(table: Table, lead_s: float) -> Array:
+def sensor_temperature_c(table: Table, lead_s: float, of_level: float = 0.0) -> Array:
     """The temperature of the sensor, which the thermometer follows with a time constant of `lead_s`, deg C, shape (n,).
 
-    A negative one is that of the sensor, which follows the thermometer. As logged where it is 0. A single row has no
-    neighbours: there the column `temperature_rate_c_s` tells the rate, and without this column it is as logged.
+    A negative one is that of the sensor, which follows the thermometer. As logged where it is 0, or its level if
+    `of_level` is not 0. A single row has no neighbours: there the column `temperature_rate_c_s` tells the rate, and
+    without this column it is as logged.
     """
-    if lead_s and table.n > 1:
+    if (lead_s or of_level) and table.n > 1:
         return leading_temperature(table, lead_s)
     if lead_s and RATE in table:
         return table.column("temperature_c") + lead_s * table.column(RATE)

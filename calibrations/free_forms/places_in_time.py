@@ -24,6 +24,7 @@ LONG_LEADS_S = (-300.0, 300.0)  # the same at rest, where an oven warms a whole 
 WAVES, WALK_WAVES = 24, 160  # of slow noise, and of a random walk, whose roughness is never small
 PLAYS = (0.05, 0.15, 0.35)  # of the range of temperatures
 BRANCHES = (0.02, 0.035, 0.06, 0.1, 0.17, 0.28, 0.45)  # the same: plays that together are a hysteresis of any shape
+OF_LEVEL = (("level", 1.0),)  # constant of an effect that the temperature drives without the scatter of its readings
 FEWEST_TIMED, FEWEST_NOISE = 12, 20  # rows that can show a function of time, and slow noise
 
 
@@ -80,7 +81,12 @@ def over_temperature(data: PoseData, first: State) -> list[Component]:
             components.append(_make_play(name, temperature)((part * float(np.ptp(temperature)),)))
         widths = tuple(part * float(np.ptp(temperature)) for part in BRANCHES)
         form = Form("temperature-bias", "branches", "temperature", (Play(widths),))
-        form_price = {"general": True, "contains": "temperature-bias", "starts": _middle_play(widths)}
+        form_price = {
+            "general": True,
+            "contains": "temperature-bias",
+            "starts": _middle_play(widths),
+            "constants": OF_LEVEL,
+        }
         components.append(
             free(form, first, "temperature-hysteresis", GENERAL, **form_price)
         )  # after transients: it settles as they do
@@ -106,7 +112,7 @@ def _make_play(name: str, temperature: Array) -> Make:
             name, "temperature-bias", "response", "temperature-hysteresis", "temperature-bias/play", GENERAL,
             _columns_over_rows(play(temperature, width)[:, None]), contains="temperature-bias",
             shape=shape, step=(0.05 * float(np.ptp(temperature)),), reshaped=_make_play(name, temperature),
-            starts=lambda _: (("play", "", width),),
+            starts=lambda _: (("play", "", width),), constants=OF_LEVEL,
         )  # fmt: skip
 
     return at
@@ -121,7 +127,7 @@ def _warmer(data: PoseData, first: State, name: str, place: str, factor: Factor,
         return Component(
             name, place, "response", place, f"{place}/line", price,
             _times_force(basis) if factor else _columns_over_rows(basis),
-            shape=shape, step=(30.0,), constants=(("lead_s", shape[0]),),
+            shape=shape, step=(30.0,), constants=(("lead_s", shape[0]), *(OF_LEVEL if data.timed else ())),
             reshaped=_warmer(data, first, name, place, factor, price) if data.timed else None,
             error=reading_error(data.table, "temperature_c", lead_s=shape[0]) if data.timed else 0.0,
         )  # fmt: skip

@@ -74,6 +74,8 @@ def _search_from_all(setting: Setting, general: bool, reason: str) -> SearchResu
         return effects_first
     together = descend(setting, general, f"{reason}all forms together")
     best = min(effects_first, together, key=lambda end: end.criterion)
+    if setting.flicker and best.ratio > MOST_MISFIT:
+        return best  # flicker of any size does not describe the misfit that it was tried for
     if any(best.component(name).place == "history" for name in best.active):
         looped = descend(setting, general, f"{reason}with loops", catalogue_first=True, loops=True)
         best = looped if looped.criterion < best.criterion - SPILL * abs(best.criterion) else best

@@ -152,7 +152,7 @@ def _term(entry: _Effect, source: str, effects_by_name: Mapping[str, Effect], un
     estimates = tuple(
         Estimate(p.name, p.axis or "", p.value, p.std, units[p.name], p.identified, p.why) for p in entry.parameters
     )
-    return Term(effect, entry.tied, estimates, entry.constants)
+    return Term(effect, entry.tied, estimates, {**(effect.former_constants if estimates else {}), **entry.constants})
 
 
 def _effect(entry: _Effect, source: str, effects_by_name: Mapping[str, Effect]) -> Effect:

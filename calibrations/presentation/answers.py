@@ -25,7 +25,7 @@ def fit_text(result: Fit) -> str:
         (name, quantity(result.rmse[c], unit), quantity(noise.floor[c], unit), f"{result.excess[c]:.2f}")
         for c, name in enumerate(result.channels)
     ]
-    head = f"{result.model.name}, fitted to {result.table.n} rows of {result.table.source or 'data without a name'}"
+    head = f"{result.model.name}, fitted to {result.table.n} rows of {result.table.source}"
     floor = "noise floor" if noise.known else "scatter (noise floor not known)"
     return f"{head}\n\n{result.params}\n\n{columns(('axis', 'rms error', floor, 'error / floor'), errors)}"
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from calibrations.discovery.results import Discovery
 from calibrations.effects.catalogue import catalogue
-from calibrations.effects.logged import level, level_is_known, reading_error
+from calibrations.effects.logged import follows_level, level, level_is_known, reading_error
 from calibrations.estimators.scatter import without_scatter
-from calibrations.fitting.fit import Fit
+from calibrations.fitting.fit import Fit, fit
 from calibrations.loop import dataset
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
@@ -131,6 +133,37 @@ def test_outputs_that_follow_the_readings_are_driven_by_the_readings() -> None:
     found = discover(table.with_outputs(table.outputs * (supply / 5.0)[:, None]))
     assert found.causes == ("supply-sensitivity",)
     assert found.findings.end.params["supply-sensitivity.x"].value == pytest.approx(1.0, abs=0.01)
+
+
+def warmed(random: np.random.Generator, effect: str) -> Table:
+    """Outputs that follow the temperature: 20 mV/K times 10 mK, the scatter of the thermometer, are 4 noise floors."""
+    temperature = 24 + 2.2 * np.arange(rows()) / rows() + 0.1 * np.sin(np.arange(rows()) / 9)
+    force = np.column_stack(synthetic.components(synthetic.turns((90, 30, 150, 60, 120), step_deg=10)))[:, :2]
+    driven = force if effect == "temperature-scale" else np.ones_like(force)
+    added = 20e-3 * (temperature - temperature.mean())[:, None] * driven * [1.0, 0.5]
+    return sweep(added, {"temperature_c": temperature + 0.01 * random.normal(size=rows())})
+
+
+@pytest.mark.parametrize("effect", ["temperature-scale", "temperature-bias"])
+def test_a_sensor_feels_the_temperature_and_not_the_scatter_of_its_thermometer(effect: str) -> None:
+    found = discover(warmed(np.random.default_rng(7), effect))
+    assert found.causes == (effect,)
+    assert found.steps[-1].held_out_after < 2.0
+    term = next(t for t in found.findings.end.model.terms if t.name == effect)
+    assert term.constants["level"] == 1.0
+
+
+@pytest.mark.parametrize("effect", ["temperature-scale", "temperature-bias"])
+def test_a_fit_without_a_search_uses_the_level_where_the_outputs_follow_it(effect: str) -> None:
+    random = np.random.default_rng(7)
+    table, model = warmed(random, effect), read_model("linear").with_effect(catalogue()[effect])
+    of_level = fit(model, table)
+    term = next(t for t in of_level.model.terms if t.name == effect)
+    assert term.constants["level"] == 1.0
+    of_readings = fit(replace(model, terms=(*model.terms[:-1], replace(term, constants={"level": 0.0}))), table)
+    assert of_level.pooled_excess < 0.7 * of_readings.pooled_excess
+    without = table.with_outputs(table.outputs - 0.02 * (table.column("temperature_c") - 25.0)[:, None])
+    assert follows_level(without, ["temperature_c"]) == 0.0
 
 
 @pytest.mark.parametrize("lead_s", [0.0, 200.0])

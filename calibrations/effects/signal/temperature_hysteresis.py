@@ -3,6 +3,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
+from calibrations.effects.logged import sensor_temperature_c
 from calibrations.table import Array, Table
 
 PARTS = (0.05, 0.15, 0.35)  # of the range of temperatures: plays to begin with
@@ -35,12 +36,14 @@ class TemperatureHysteresis(Effect):
         guess=lambda table: np.outer(PARTS, np.full(len(table.axes), np.ptp(table.column("temperature_c")))),
         doc="half of its width",
     )
+    level = Constant(lambda _: 0.0, assumed=0.0)  # 1: without the scatter of the readings; a search sets it
     reference_c = Constant(lambda table: float(np.mean(table.column("temperature_c"))))
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
         from calibrations.effects.kernels import play  # numba is slow to import
 
-        return np.outer(play(table.column("temperature_c"), float(p.play)) - p.reference_c, p.slope)
+        temperature_c = sensor_temperature_c(table, 0.0, float(p.level))
+        return np.outer(play(temperature_c, float(p.play)) - p.reference_c, p.slope)
 
     def follow(self, a: Array, table: Table, p: Values, before: Sequence[Array]) -> tuple[Array, list[Array]]:
         """`before` and after: the temperature behind the play, less T0, K; so it begins at T0."""

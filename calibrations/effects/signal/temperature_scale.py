@@ -1,7 +1,7 @@
 import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
-from calibrations.effects.logged import sensor_temperature_c
+from calibrations.effects.logged import follows_level, sensor_temperature_c
 from calibrations.table import Array, Table
 
 
@@ -24,8 +24,11 @@ class TemperatureScale(Effect):
 
     slope = Parameter("{out}/g/K", typical=0.001, doc="scale factor per kelvin")
     lead_s = Constant(lambda _: 0.0)  # by which the sensor is ahead of the thermometer; a search finds it
+    level = Constant(  # 1: without the scatter of the readings
+        lambda table: follows_level(table, ["temperature_c"], scales=True), assumed=0.0
+    )
     reference_c = Constant(lambda table: float(np.mean(table.column("temperature_c"))))
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
-        warmer = sensor_temperature_c(table, float(p.lead_s)) - p.reference_c
+        warmer = sensor_temperature_c(table, float(p.lead_s), float(p.level)) - p.reference_c
         return warmer[:, None] * a * p.slope
