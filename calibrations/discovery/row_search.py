@@ -164,7 +164,7 @@ class RowSearch:
             return self._path_findings(path, effects, origin)
         from calibrations.discovery.structural import search_structure  # only this search needs it
 
-        structural = search_structure(start, effects)
+        structural = search_structure(start, effects, path.ranked if start.noise.known else ())
         if structural.steps and path.steps and _cross_validated(path.end) <= _cross_validated(structural.end):
             return self._path_findings(path, effects, origin)  # the larger model must predict better
         findings = self._structural_findings(structural, outliers, structural.start if origin is start else origin)

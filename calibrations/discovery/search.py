@@ -69,6 +69,11 @@ class Path:
         """The last fit."""
         return self.steps[-1].after if self.steps else self.start
 
+    @property
+    def ranked(self) -> tuple[RowCandidate, ...]:
+        """Candidates on the given model, best first."""
+        return self.steps[0].candidates if self.steps else self.last_candidates
+
     @cached_property
     def first(self) -> tuple[RowCandidate, ...]:
         """Candidates on the given model: first the selected one with all its rivals, then the others."""

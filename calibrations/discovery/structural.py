@@ -74,13 +74,24 @@ class StructuralSearch:
 
     @classmethod
     def of_fits(
-        cls, start: Fit, freed: list[str], added: list[Addition], fits: list[Fit], effects: Mapping[str, Effect]
+        cls,
+        start: Fit,
+        freed: list[str],
+        added: list[Addition],
+        fits: list[Fit],
+        effects: Mapping[str, Effect],
+        ranked: Sequence[RowCandidate] = (),
     ) -> StructuralSearch:
-        """The search whose steps are the effects `freed`, up to the first of the `fits`, and then the additions."""
+        """The search whose steps are the effects `freed`, up to the first of the `fits`, and then the additions.
+
+        `ranked`: the candidates on `start`, if they are known.
+        """
         steps = _steps(start, freed, fits[0], effects)
         steps += [Step(a.effect.name, *pair) for a, pair in zip(added, pairwise(fits), strict=True)]
-        report("testing each effect alone")
-        ranked = _first(start, steps, candidates(start, effects))
+        if not ranked:
+            report("testing each effect alone")
+            ranked = candidates(start, effects)
+        ranked = _first(start, steps, ranked)
         forms = [a for a in added if a.effect.name.startswith(PREFIX)]
         return cls(start, tuple(steps), ranked, causes_alone(fits[-1], forms))
 
@@ -105,15 +116,17 @@ class StructuralSearch:
         return {name: rivals for name, rivals in rivals_by_cause.items() if rivals}
 
 
-def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSearch:
-    """The effects and free forms that the model of `start` misses."""
+def search_structure(
+    start: Fit, effects: Mapping[str, Effect], ranked: Sequence[RowCandidate] = ()
+) -> StructuralSearch:
+    """The effects and free forms that the model of `start` misses; `ranked`: the candidates on it, if they are known."""
     basic = [name for name in BASIC if name in effects and not start.model.holds(name)]
     base = fit_each_axis(start, basic, effects)
     stated_white = start.problem.white
     base, best, floor = _best_structure(base, effects)
     remarks: tuple[str, ...] = ()
     if floor is not None:
-        start = fit(start.model, with_white(start.table, best.structure.white))
+        start, ranked = fit(start.model, with_white(start.table, best.structure.white)), ()
         remarks = (f"The noise floor is that of the residual: {floor}.",)
     needed = [name for name in basic if chance(*first_order_cost(best.end, name, shared=True)) < SIGNIFICANT]
     report("fitting the model with one effect more at a time")
@@ -122,7 +135,7 @@ def search_structure(start: Fit, effects: Mapping[str, Effect]) -> StructuralSea
     selected, fits = _fit_each_addition(base, best, renew=needed != basic)
     if floor is not None and stated_white is not None:
         fits[-1] = with_least_white(fits[-1], stated_white)
-    found = StructuralSearch.of_fits(start, needed, selected, fits, effects)
+    found = StructuralSearch.of_fits(start, needed, selected, fits, effects, ranked)
     structure = best.structure
     return replace(
         found, places=structure.places, named=structure.causes, rivals=structure.alternatives, remarks=remarks
@@ -306,7 +319,7 @@ def _steps(start: Fit, names: list[str], base: Fit, effects: Mapping[str, Effect
     return [Step(name, *pair) for name, pair in zip(names, pairwise(fits[: len(names) + 1]), strict=True)]
 
 
-def _first(start: Fit, steps: list[Step[Fit]], ranked: list[RowCandidate]) -> tuple[RowCandidate, ...]:
+def _first(start: Fit, steps: list[Step[Fit]], ranked: Sequence[RowCandidate]) -> tuple[RowCandidate, ...]:
     """The candidates on the given model, those of the steps first, the first one with the errors of its full fit.
 
     A single cause has the rivals of the search that adds effects; several causes have none here.
