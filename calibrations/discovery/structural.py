@@ -119,7 +119,7 @@ class StructuralSearch:
 def search_structure(
     start: Fit, effects: Mapping[str, Effect], ranked: Sequence[RowCandidate] = ()
 ) -> StructuralSearch:
-    """The effects and free forms that the model of `start` misses; `ranked`: the candidates on it, if they are known."""
+    """The effects and free forms that the model of `start` misses; `ranked`: the candidates on it, where known."""
     basic = [name for name in BASIC if name in effects and not start.model.holds(name)]
     base = fit_each_axis(start, basic, effects)
     stated_white = start.problem.white
