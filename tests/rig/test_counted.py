@@ -48,8 +48,9 @@ def test_an_analysis_says_what_it_does(tmp_path: Path) -> None:
     assert texts[-1] == "searching for places (effects first), pass 1 of at most 7"
 
 
-def test_searches_that_follow_each_other_have_different_names(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Else the progress seems to go back from the last pass of one to the first pass of the next."""
+@pytest.fixture
+def steps(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The names of the descents that a search makes; each ends far above the noise, with a component of the history."""
     steps: list[str] = []
 
     def descended(_setting: object, _general: bool, step: str, **_options: object) -> SimpleNamespace:
@@ -58,8 +59,13 @@ def test_searches_that_follow_each_other_have_different_names(monkeypatch: pytes
         return SimpleNamespace(ratio=MOST_MISFIT + 0.1, active=["loop"], criterion=0.0, component=lambda _: place)
 
     monkeypatch.setattr(search, "descend", descended)
+    return steps
+
+
+def test_searches_that_follow_each_other_have_different_names(steps: list[str]) -> None:
+    """Else the progress seems to go back from the last pass of one to the first pass of the next."""
     for reason in ("", "with larger noise, round 1, "):
-        search._search_from_all(SimpleNamespace(first_jumps="the steps"), True, reason)
+        search._search_from_all(SimpleNamespace(first_jumps="the steps", flicker=False), True, reason)
     jumps = "with steps of a converter"
     starts = [
         "effects first",
@@ -69,6 +75,11 @@ def test_searches_that_follow_each_other_have_different_names(monkeypatch: pytes
         f"{jumps}, all forms together",
     ]
     assert steps == [*starts, *(f"with larger noise, round 1, {start}" for start in starts)]
+
+
+def test_a_search_in_flicker_ends_after_two_starts_if_effects_remain(steps: list[str]) -> None:
+    search._search_from_all(SimpleNamespace(first_jumps="the steps", flicker=True), True, "")
+    assert steps == ["effects first", "all forms together"]
 
 
 def test_a_cancelled_search_ends(tmp_path: Path) -> None:
