@@ -23,7 +23,6 @@ from calibrations.free_forms.components import (
     free,
     per_axis,
 )
-from calibrations.free_forms.dead_zones import dead_zones
 from calibrations.free_forms.form import CROSS, TILT, TURNED, Factor, Form
 from calibrations.free_forms.place_names import acts_at_rest
 from calibrations.free_forms.places_in_time import FEWEST_TIMED, over_temperature, over_time, slow_noise
@@ -36,6 +35,7 @@ from calibrations.table import Array
 WIDTHS_G = tuple(np.geomspace(0.01, 1.8, 14).tolist())  # of slip elements
 LOOPS_G = (0.02, 0.06, 0.15, 0.35, 0.8)  # half widths of the loops of a Preisach hysteresis
 LOOP_INTERVALS = 8
+DEAD_G = (0.003, 0.012, 0.05)
 THRESHOLDS_G = tuple(np.geomspace(0.002, 0.2, 8).tolist())  # of dead zones that are not all of one width
 KNEE_G = 0.005  # width of the bend where the search for it starts
 ENDS = (0.75, 0.9, 0.97, 0.99)  # of an axis's range, where saturation begins
@@ -123,9 +123,23 @@ def _response_components(data: PoseData, first: State) -> list[Component]:
         form("scale-factor-asymmetry", lambda s, k: np.abs(s.force[:, k, None])),
         free(Form(place, "curve", "own", _splines_over(first.force, data.channels, 22)), first),
     ]
-    components += dead_zones(data, first)
+    price = 2 * np.log(len(DEAD_G))
+
+    def dead_zone(name: str) -> Make:
+        return lambda shape: Component(
+            name, place, "response", "dead-zone", f"{place}/dead-zone", price, per_axis(_dead_zone(shape)),
+            shape=shape, step=tuple(0.3 * w for w in shape), reshaped=dead_zone(name),
+            starts=lambda _: tuple(("width", axis, abs(w)) for axis, w in zip(data.axes, shape, strict=True)),
+        )  # fmt: skip
+
+    components += [dead_zone(f"{place}/dead-zone@{width:.4f}")((width,) * data.channels) for width in DEAD_G]
     components.append(free(Form(place, "thresholds", "own", (Clips(THRESHOLDS_G),)), first, "dead-zone", PRODUCT))
     return components + _saturations(data, first)
+
+
+def _dead_zone(widths: tuple[float, ...]) -> Basis:
+    """Specific force clipped at a width of each channel's own, g."""
+    return lambda s, k: np.clip(s.force[:, k, None], -abs(widths[k]), abs(widths[k]))
 
 
 def _saturations(data: PoseData, first: State) -> list[Component]:

@@ -109,24 +109,3 @@ def test_an_arm_that_sags_is_an_offset_of_the_stage_and_no_effect_of_the_sensor(
     sag = 0.063 * (1 + 0.15 * np.sin(np.radians(columns["alpha_deg"])))
     found = discover(columns, forces(columns, alpha_deg=sag, beta_deg=-0.03)[:, :2])
     assert found.causes == ("stage-zero-offset",)
-
-
-@pytest.mark.parametrize("width_g", [0.0006, 0.006])
-def test_a_dead_zone_about_another_force_than_0_g_has_its_name(width_g: float) -> None:
-    """An offset before the threshold moves it: the steps of the two axes are 12 and 120 noise floors high."""
-    a = forces(TURN)[:, :2]
-    found = discover(TURN, a - np.clip(a - [0.06, -0.04], -width_g, width_g))
-    assert found.causes == ("dead-zone",)
-    assert found.steps[-1].held_out_after < 1.15
-    term = next(t for t in found.findings.end.model.terms if t.name == "dead-zone")
-    gaps = [max(np.diff(np.unique(np.round(column, 6)))) for column in a.T]
-    assert term.constants["centre_x"] == pytest.approx(0.06, abs=gaps[0])
-    assert term.constants["centre_y"] == pytest.approx(-0.04, abs=gaps[1])
-
-
-def test_a_dead_zone_about_0_g_gets_no_other_centre() -> None:
-    a = forces(TURN)[:, :2]
-    found = discover(TURN, a - np.clip(a, -0.002, 0.002))
-    assert found.causes == ("dead-zone",)
-    term = next(t for t in found.findings.end.model.terms if t.name == "dead-zone")
-    assert {term.constants[f"centre_{axis}"] for axis in "xyz"} == {0.0}
