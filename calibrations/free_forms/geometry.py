@@ -4,8 +4,7 @@ The linear parts of the fit are a vector q of small angles with a covariance. Ea
 forces by its own equations, which are exact: of angles of 1 deg the second order is many standard uncertainties. Its
 parameters are fitted to q by Gauss-Newton steps. A place that acts over another axis may have a linear part of its own,
 as large as the odd part of its curve: so much is added to the covariance before anything is asked, so that no
-mechanism's linear part names a second cause. An even curve over the other axis in the plane, such as that of
-cross-axis-bias, has a small one.
+mechanism's linear part names a second cause. An even curve, such as that of cross-axis-bias, has a small one.
 """
 
 from __future__ import annotations
@@ -29,9 +28,10 @@ GEOMETRY = ("axis-nonorthogonality", "axis-misalignment", "stage-zero-offset", "
 CAUSE_PRICE, PARAMETER_PRICE = 12.0, 2.0  # of chi-square
 CLOSE = 8.0  # of chi-square: the data cannot separate explanations that differ by less
 LINEAR_PART = 2.0  # of a curve's odd part: the standard deviation of a mechanism's own linear part
-# The same of its even part. A gap that the out-of-plane force narrows gives a / (1 - k z): a line 1 / k times as large
-# as its square. It turns no axis in the plane, so that a misalignment beside it still shows by its angle about z.
-EVEN_PART = {"cross-response": 1.0, "z-response": 5.0}
+EVEN_PART = 1.0  # the same of its even part
+# A gap that the out-of-plane force narrows gives a / (1 - k z): its line is to its square as this is to its cube, so
+# that the odd part of its curve tells the line. A misalignment beside it still shows by its angle about z.
+NARROWING, GAP_LINE = 0.05, 5.0  # least odd part of such a curve, and most of its line, both over the even part
 EVEN, ODD = (2, 4, 6), (3, 5)  # powers of the driver
 LEAST_LINE = 0.3  # noise floors: a smaller linear part is left out
 SEEN = 3.5  # standard uncertainties: a smaller linear part may be noise
@@ -141,7 +141,10 @@ def _linear_part(result: SearchResult, place: str, curve: Array) -> float:
         part = X[:, 2 : 2 + len(EVEN)] @ u[2 : 2 + len(EVEN)]
         even += float(np.var(part)) / len(curve)
     even = min(even, total)
-    return float(np.sqrt(LINEAR_PART**2 * (total - even) + EVEN_PART[place] ** 2 * even))
+    odd = total - even
+    is_gap = place == "z-response" and odd > NARROWING**2 * even
+    line_of_gap = min(even**2 / odd, GAP_LINE**2 * even) if is_gap else 0.0
+    return float(np.sqrt(LINEAR_PART**2 * odd + EVEN_PART**2 * even + line_of_gap))
 
 
 def _base_with_forms(result: SearchResult, sizes: Mapping[str, float]) -> tuple[Array, Array]:
