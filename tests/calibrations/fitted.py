@@ -52,6 +52,9 @@ def model(
             for p, given in parameters.items()
             for axis, value in (zip("xyz", given, strict=False) if isinstance(given, tuple) else [("", given)])
         ]
-        kept = {c: {**REFERENCES, "lead_s": 0.0, **constants}.get(c, 1.0) for c in effect.constants}
+        kept = {
+            c: {**REFERENCES, "lead_s": 0.0, **effect.former_constants, **constants}.get(c, 1.0)
+            for c in effect.constants
+        }
         terms.append(Term(effect, estimates=tuple(estimates), constants=kept))
     return Model("by-hand", tuple(terms), "V", {"data": "a run", "sensor": "ADXL203", "serial": "17"})

@@ -36,6 +36,15 @@ def test_an_older_model_answers_as_before(file: Path) -> None:
     assert np.max(np.abs(evaluated.residual)) < SECOND_ORDER_V.get(file.stem, 1e-12)
 
 
+def test_constants_that_came_later_have_the_values_that_were_assumed() -> None:
+    text = (
+        "schema: rig.model/1\nname: alone\neffects:\n- effect: temperature-bias\n  constants: {lead_s: 40.0}\n"
+        "  parameters:\n  - {name: slope, axis: x, value: 0.001}\n"
+    )
+    (temperature,) = parse_model(text, "alone.yaml").terms
+    assert temperature.constants == {"lead_s": 40.0, "level": 0.0}
+
+
 def test_a_value_of_all_axes_becomes_that_of_each_axis() -> None:
     model = read_model(ROOT / "tests" / "data" / "models" / "common-reach.yaml")
     assert [model[f"hysteresis.reach.{axis}"].value for axis in "xy"] == [0.15, 0.15]

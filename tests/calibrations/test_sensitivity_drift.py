@@ -16,7 +16,7 @@ COLUMNS = synthetic.turns(inclinations_deg=(90, 30))
 AX, AY, AZ = synthetic.components(COLUMNS)
 WARMER = np.sin(0.01 * COLUMNS["t_s"])
 TABLE = synthetic.poses(COLUMNS | {"temperature_c": 25 + WARMER}, 2.5 + AX, 2.5 + AY)
-DRIFT = ("temperature-scale", {"slope": [0.01, 0.02, 0.0], "lead_s": 0.0, "reference_c": 25.0})
+DRIFT = ("temperature-scale", {"slope": [0.01, 0.02, 0.0], "lead_s": 0.0, "level": 0.0, "reference_c": 25.0})
 LINEAR = (("bias", {"bias": [2.5, 2.4, 0.0]}), ("scale-factor", {"scale": [1.1, 0.9, 1.0]}))
 
 
