@@ -140,9 +140,10 @@ def trace_model(model: Model, without: Collection[str] = ()) -> Forward:
 
 def _values(term: Term) -> Values:
     """Constants and parameters by name, a parameter per axis of shape (3,); 0 without a value."""
-    if missing := [name for name in term.effect.constants if name not in term.constants]:
+    constants = term.known_constants
+    if missing := [name for name in term.effect.constants if name not in constants]:
         raise ModelError(f"{term.name}: the constant {missing[0]} is missing; `rig fit` writes it into the model file")
-    values = Values.of(term.constants)
+    values = Values.of(constants)
     values |= {p.name: np.zeros(3 if p.per_axis else ()) for p in term.effect.parameters}
     for e in term.estimates:
         if not e.axis:

@@ -20,7 +20,6 @@ from calibrations.discovery.row_search import ONE_ORIENTATION, RowSearch
 from calibrations.discovery.summary import Line, step_shares, summary_lines
 from calibrations.discovery.verdict import Finding
 from calibrations.effects import Effect
-from calibrations.effects.expression_effect import effect_for
 from calibrations.errors import ModelError, nearest
 from calibrations.fitting.determined import blind_to, explain_undetermined
 from calibrations.fitting.fit import Fit, axis_of, evaluate, fit, refit
@@ -201,6 +200,8 @@ class Rows(Dataset[Fit]):
 
     def expression(self, name: str, text: str) -> Effect:
         """An effect that the user wrote, on the columns of this table."""
+        from calibrations.effects.expression_effect import effect_for  # few sessions write one
+
         return effect_for(name, text, self.table)
 
     @property

@@ -87,7 +87,8 @@ class Parameter:
 class Constant:
     """A reference value, such as the mean temperature: computed from the first table, then kept with the model.
 
-    `assumed` is the value in model files with parameters that do not give it, as they were written before it existed.
+    `assumed` is the value in model files that give other constants of the effect and not this one, as they were written
+    before it existed.
     """
 
     of: Callable[[Table], float]
@@ -130,7 +131,7 @@ class Effect:
     name: str
     parameters: tuple[Parameter, ...] = ()
     constants: Mapping[str, Callable[[Table], float]] = {}
-    former_constants: Mapping[str, float] = {}  # constants that model files of an earlier version do not have
+    assumed_constants: Mapping[str, float] = {}  # their values in model files that do not give them
     places: frozenset[str] = frozenset()  # those of HOOKS where it acts
     expression: str = ""  # where one line of arithmetic defines it; kept in model files
 
@@ -165,7 +166,7 @@ class Effect:
         constants = {m: v for m, v in members.items() if isinstance(v, Constant)}
         cls.constants = {**cls.constants, **{m: v.of for m, v in constants.items()}}
         assumed = {m: v.assumed for m, v in constants.items() if v.assumed is not None}
-        cls.former_constants = {**cls.former_constants, **assumed}
+        cls.assumed_constants = {**cls.assumed_constants, **assumed}
         cls.places = frozenset(hook for hook in HOOKS if getattr(cls, hook) is not getattr(Effect, hook))
         if "Symptom" in (cls.__doc__ or ""):
             for part, text in _sections(cls.__doc__ or "").items():

@@ -103,11 +103,11 @@ def _smooth(logged: Array) -> tuple[Array, float, float]:
     return np.asarray(values), float(np.hypot(smooth.error, of_line)), smooth.change_error
 
 
-def sensor_temperature_c(table: Table, lead_s: float, of_level: float = 0.0) -> Array:
+def sensor_temperature_c(table: Table, lead_s: float, of_level: bool = False) -> Array:
     """The temperature of the sensor, which the thermometer follows with a time constant of `lead_s`, deg C, shape (n,).
 
     A negative one is that of the sensor, which follows the thermometer. As logged where it is 0, or its level if
-    `of_level` is not 0. A single row has no neighbours: there the column `temperature_rate_c_s` tells the rate, and
+    `of_level`. A single row has no neighbours: there the column `temperature_rate_c_s` tells the rate, and
     without this column it is as logged.
     """
     if (lead_s or of_level) and table.n > 1:

@@ -11,7 +11,6 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue, find
-from calibrations.effects.expression_effect import own_effect
 from calibrations.errors import ModelError, UnknownName, nearest
 from calibrations.files import load_yaml
 from calibrations.model import Estimate, Model, Term
@@ -152,7 +151,7 @@ def _term(entry: _Effect, source: str, effects_by_name: Mapping[str, Effect], un
     estimates = tuple(
         Estimate(p.name, p.axis or "", p.value, p.std, units[p.name], p.identified, p.why) for p in entry.parameters
     )
-    return Term(effect, entry.tied, estimates, {**(effect.former_constants if estimates else {}), **entry.constants})
+    return Term(effect, entry.tied, estimates, entry.constants)
 
 
 def _effect(entry: _Effect, source: str, effects_by_name: Mapping[str, Effect]) -> Effect:
@@ -198,6 +197,8 @@ def _expression_effect(entry: _Effect, source: str, effects_by_name: Mapping[str
     """The effect of an expression. The file has all of it, and no code of the file is executed."""
     if entry.effect in effects_by_name:
         raise ModelError(f"{source}: {entry.effect} is already the name of an effect; give the expression another name")
+    from calibrations.effects.expression_effect import own_effect  # few models have one
+
     try:
         return own_effect(entry.effect, entry.expression or "", tuple(entry.columns))
     except ModelError as error:

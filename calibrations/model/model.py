@@ -61,6 +61,11 @@ class Term:
         return self.effect.name
 
     @property
+    def known_constants(self) -> dict[str, float]:
+        """Its constants. A term that has some of them, but not those that came later, is of an older model file."""
+        return {**(self.effect.assumed_constants if self.constants else {}), **self.constants}
+
+    @property
     def quantities(self) -> tuple[Estimate, ...]:
         """The estimates with a meaning of their own: without the coefficients of a free form."""
         coefficients = {p.name for p in self.effect.parameters if p.prior is not None}
@@ -238,5 +243,6 @@ def _separate_axes(term: Term) -> Term:
 
 
 def _with_constants(term: Term, table: Table) -> Term:
-    missing = {name: make(table) for name, make in term.effect.constants.items() if name not in term.constants}
-    return replace(term, constants={**term.constants, **missing})
+    known = term.known_constants
+    missing = {name: make(table) for name, make in term.effect.constants.items() if name not in known}
+    return replace(term, constants={**known, **missing})

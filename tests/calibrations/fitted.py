@@ -53,7 +53,7 @@ def model(
             for axis, value in (zip("xyz", given, strict=False) if isinstance(given, tuple) else [("", given)])
         ]
         kept = {
-            c: {**REFERENCES, "lead_s": 0.0, **effect.former_constants, **constants}.get(c, 1.0)
+            c: {**REFERENCES, "lead_s": 0.0, **effect.assumed_constants, **constants}.get(c, 1.0)
             for c in effect.constants
         }
         terms.append(Term(effect, estimates=tuple(estimates), constants=kept))

@@ -148,6 +148,7 @@ def warmed(random: np.random.Generator, effect: str) -> Table:
 def test_a_sensor_feels_the_temperature_and_not_the_scatter_of_its_thermometer(effect: str) -> None:
     found = discover(warmed(np.random.default_rng(7), effect))
     assert found.causes == (effect,)
+    assert [step.name for step in found.steps] == [effect]  # scatter that was taken for temperature leaves a curve
     assert found.steps[-1].held_out_after < 2.0
     term = next(t for t in found.findings.end.model.terms if t.name == effect)
     assert term.constants["level"] == 1.0

@@ -42,7 +42,9 @@ def test_constants_that_came_later_have_the_values_that_were_assumed() -> None:
         "  parameters:\n  - {name: slope, axis: x, value: 0.001}\n"
     )
     (temperature,) = parse_model(text, "alone.yaml").terms
-    assert temperature.constants == {"lead_s": 40.0, "level": 0.0}
+    assert temperature.known_constants == {"lead_s": 40.0, "level": 0.0}
+    (for_table,) = parse_model(text, "alone.yaml").for_table(read_csv(ROOT / "tests/golden/files/thermal.csv")).terms
+    assert for_table.constants["level"] == 0.0
 
 
 def test_a_value_of_all_axes_becomes_that_of_each_axis() -> None:

@@ -71,6 +71,15 @@ def test_an_out_of_plane_gap_has_one_name_for_its_line_and_its_curve() -> None:
     assert found.steps[-1].held_out_after < 1.15
 
 
+def test_a_misalignment_that_turns_no_axis_in_the_plane_keeps_its_name_beside_a_square() -> None:
+    """The line of a gap would come with a cube, which is not there."""
+    a = forces(TURN)
+    tilted = a[:, :2] + np.radians([0.5, -0.4]) * a[:, 2:]
+    found = discover(TURN, tilted + 3e-3 * a[:, 2:] ** 2)
+    assert set(found.causes) == {"axis-misalignment", "z-axis-bias"}
+    assert found.steps[-1].held_out_after < 1.15
+
+
 def test_a_misalignment_beside_an_out_of_plane_gap_keeps_its_name() -> None:
     """Its angle about z shows it."""
     a = forces(TURN, beta_deg=0.1)

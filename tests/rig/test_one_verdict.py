@@ -31,7 +31,7 @@ from tests.rig.conftest import Ended
 
 Rig = Callable[..., Ended]
 MOST_STEPS = 20
-MOST_MODULES = 152
+MOST_MODULES = 150
 LIKELY = 0.5
 
 

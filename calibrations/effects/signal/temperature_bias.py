@@ -26,5 +26,5 @@ class TemperatureBias(Effect):
     reference_c = Constant(lambda table: float(np.mean(table.column("temperature_c"))))
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
-        warmer = sensor_temperature_c(table, float(p.lead_s), float(p.level)) - p.reference_c
+        warmer = sensor_temperature_c(table, float(p.lead_s), bool(p.level)) - p.reference_c
         return warmer[:, None] * p.slope

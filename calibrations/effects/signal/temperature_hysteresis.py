@@ -42,7 +42,7 @@ class TemperatureHysteresis(Effect):
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
         from calibrations.effects.kernels import play  # numba is slow to import
 
-        temperature_c = sensor_temperature_c(table, 0.0, float(p.level))
+        temperature_c = sensor_temperature_c(table, 0.0, bool(p.level))
         return np.outer(play(temperature_c, float(p.play)) - p.reference_c, p.slope)
 
     def follow(self, a: Array, table: Table, p: Values, before: Sequence[Array]) -> tuple[Array, list[Array]]:

@@ -30,5 +30,5 @@ class TemperatureScale(Effect):
     reference_c = Constant(lambda table: float(np.mean(table.column("temperature_c"))))
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
-        warmer = sensor_temperature_c(table, float(p.lead_s), float(p.level)) - p.reference_c
+        warmer = sensor_temperature_c(table, float(p.lead_s), bool(p.level)) - p.reference_c
         return warmer[:, None] * a * p.slope
