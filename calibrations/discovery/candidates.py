@@ -85,18 +85,21 @@ def best_pair(base: Fit, ranked: list[RowCandidate]) -> tuple[RowCandidate, RowC
     for (a, b), gain in zip(pairs, joint, strict=True):
         rank = a.rank + b.rank
         free = base.residual.size - base.jacobian.shape[2] - rank - base.problem.smooth.size
-        p = _tail(gain, base.residual.size, rank, max(free, 1)) * len(pairs)
+        p = chance_of_gain(gain, base.residual.size, rank, max(free, 1)) * len(pairs)
         if p < lowest_p:
             best, lowest_p = (a, b), p
     return best if lowest_p < SIGNIFICANT else None
 
 
-def _tail(twice_gain: float, rows: int, rank: int, free: float) -> float:
-    """Chance of such a gain on noise. F rather than chi-squared: the noise's level is estimated from these rows.
+def chance_of_gain(twice_gain: float, rows: int, rank: int, free: float) -> float:
+    """Chance of such a gain in log-likelihood on noise.
 
-    Columns that the model already spans (rank 0) prove nothing: any gain is chance.
+    F rather than chi-squared: the noise's level is estimated from these rows.
+
+    Columns that the model already spans (rank 0) prove nothing: any gain is chance. So is a loss: a fit with a penalty,
+    or with another noise, can be less likely than the one before.
     """
-    if rank == 0:
+    if rank == 0 or twice_gain <= 0:
         return 1.0
     return float(fdtrc(rank, free, np.expm1(min(twice_gain / rows, 500.0)) * free / rank))
 
@@ -133,7 +136,7 @@ def _free_candidate(effect: Effect, base: Fit, extended: Fit) -> RowCandidate:
     gain, rank = twice_log_likelihood(extended) - twice_log_likelihood(base), basis.shape[1]
     free = min(base.residual.size - base.jacobian.shape[2] - rank, base.noise.freedom)
     return RowCandidate(
-        effect=effect, rank=rank, gain=gain, p_value=_tail(gain, base.residual.size, rank, max(free, 1)),
+        effect=effect, rank=rank, gain=gain, p_value=chance_of_gain(gain, base.residual.size, rank, max(free, 1)),
         probability=0.0, excess_after=extended.pooled_excess, held_out_after=extended.held_out_excess,
         start=start, columns=columns, basis=basis,
     )  # fmt: skip
@@ -226,7 +229,7 @@ def _candidate(
     score = screen.statistic(basis)
     free = min(base.residual.size - base.jacobian.shape[2] - rank - smooth * len(base.channels), base.noise.freedom)
     p_score = float(fdtrc(rank, free, score / rank)) if smooth else 1.0
-    p_refitted = _tail(smooth_gain, base.residual.size, rank, free)
+    p_refitted = chance_of_gain(smooth_gain, base.residual.size, rank, free)
     tests, searched = 2 if smooth else 1, effect.searched(base.table)
     remainder = base.residual - np.concatenate([base.jacobian, columns], axis=2) @ _change(base, columns)
     return RowCandidate(

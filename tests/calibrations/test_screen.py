@@ -9,6 +9,7 @@ import pytest
 from scipy.stats import kstest
 
 from calibrations.criteria import NOT_SHOWN
+from calibrations.discovery.candidates import chance_of_gain
 from calibrations.discovery.significance import Screen, Search, of_search, reductions
 from calibrations.fitting.fit import Fit, fit
 from calibrations.means.noise import Noise
@@ -144,3 +145,9 @@ def test_a_candidate_that_the_model_holds_reduces_nothing() -> None:
 def test_a_repeated_column_counts_once(fitted: Fit) -> None:
     column = np.random.default_rng(19).standard_normal((*fitted.residual.shape, 1))
     assert Screen(fitted).basis(np.concatenate([column, 2 * column], axis=2)).shape[1] == 1
+
+
+def test_chance_of_a_loss_or_of_no_gain_is_one() -> None:
+    assert [chance_of_gain(gain, 108, rank=17, free=50) for gain in (-40.0, -1e-12, 0.0)] == [1.0, 1.0, 1.0]
+    assert chance_of_gain(1e-6, 108, rank=17, free=50) == pytest.approx(1.0)
+    assert chance_of_gain(400.0, 108, rank=17, free=50) < 1e-9
