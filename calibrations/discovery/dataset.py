@@ -229,7 +229,7 @@ class Dataset(ABC, Generic[F]):
         If only the residual measures the noise, or the rows scatter more than their samples, the method searches for
         `effects`: only a search can separate noise from an effect then.
         """
-        compared = self._compared(self.evaluate(model) or self.fit(model))
+        compared = self.compare_fit(self.evaluate(model) or self.fit(model))
         if effects is None or compared.rejection is not None or not self._needs_search(compared):
             return compared
         judgement = self.diagnose(model, effects).judgement
@@ -242,7 +242,7 @@ class Dataset(ABC, Generic[F]):
 
         A model that fails nowhere is not judged: an effect may be significant without a place that fails.
         """
-        compared = self._compared(fit)
+        compared = self.compare_fit(fit)
         undecided = compared.rejection is not None or not self.is_noise_known(fit) or self._needs_search(compared)
         if undecided or not compared.fails:
             return None
@@ -255,7 +255,7 @@ class Dataset(ABC, Generic[F]):
             searched=False,
         )
 
-    def _compared(self, fit: F) -> Comparison[F]:
+    def compare_fit(self, fit: F) -> Comparison[F]:
         """The comparison of a fitted model, without a search."""
         return Comparison(self, fit, self.places(fit), self.rejection(fit))
 

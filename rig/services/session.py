@@ -168,7 +168,8 @@ class ModelSession(Generic[F]):
     def compared(self) -> Comparison[F]:
         """Compare the present model with the data. A given model with values keeps them."""
         report(f"Testing the model on {self.data.unseen}")
-        return self.kept.compare(self.end.model if self.steps else self.model)
+        given = None if self.steps else self.kept.evaluate(self.model)
+        return self.kept.compare_fit(given or self.end)
 
     def judged(self) -> Judgement | None:
         """The judgement on the present model before its search; None where only a search can decide, or has decided."""

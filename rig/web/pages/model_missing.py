@@ -175,9 +175,15 @@ class Missing:
 
     def _show_further(self, result: Diagnosis[Any]) -> None:
         further = result.candidates[FIRST:]
-        with ui.expansion(f"{len(further)} more, less likely").props("dense"):
-            for c in further:
-                Card(self, c, result, best=False)
+        expansion = ui.expansion(f"{len(further)} more, less likely").props("dense")
+
+        def fill() -> None:
+            if not expansion.default_slot.children:
+                with expansion:
+                    for c in further:
+                        Card(self, c, result, best=False)
+
+        expansion.on_value_change(fill)
 
     async def look_at(self, c: Candidate, look: bool = False) -> None:
         """Draw the candidate in the residual; with `look`, against the column that it follows."""
@@ -209,10 +215,10 @@ class Missing:
 
 
 class Card:
-    """One candidate: description, error before and after, and the button to add it."""
+    """One candidate: error before and after; unfolded, its description and the button to add it."""
 
     def __init__(self, side: Missing, c: Candidate, result: Diagnosis[Any], best: bool) -> None:
-        self.side, self.c = side, c
+        self.side, self.c, self.result = side, c, result
         with div("card first" if best else "card"):
             with ui.element("button").classes("head").props("type=button aria-expanded=false") as self.head:
                 words(c.name, "what")
@@ -221,16 +227,14 @@ class Card:
             self.head.on("click", self.toggle)
             self.body = div("body")
             self.body.set_visibility(False)
-            with self.body:
-                words(capital(c.effect.summary))
-                with div("row-of"):
-                    button(f"Add {c.name}", "add", lambda: side.add(c), "dense unelevated")
-                    ui.button("Show the curve", on_click=lambda: side.look_at(c, look=True)).props("dense flat")
-                self._describe(result)
 
-    def _describe(self, result: Diagnosis[Any]) -> None:
-        c = self.c
-        ui.html(formula_html(c.effect.formula, self.side.unit), sanitize=False).classes("formula")  # it escapes
+    def _describe(self) -> None:
+        c, result, side = self.c, self.result, self.side
+        words(capital(c.effect.summary))
+        with div("row-of"):
+            button(f"Add {c.name}", "add", lambda: side.add(c), "dense unelevated")
+            ui.button("Show the curve", on_click=lambda: side.look_at(c, look=True)).props("dense flat")
+        ui.html(formula_html(c.effect.formula, side.unit), sanitize=False).classes("formula")  # it escapes
         with div("chance"):
             div("").style(f"width: {100 * c.probability:.1f}%")
         rivals = ", ".join(c.indistinguishable_from)
@@ -246,6 +250,9 @@ class Card:
 
     def open(self) -> None:
         """Unfold the card; the pictures stay as they are."""
+        if not self.body.default_slot.children:
+            with self.body:
+                self._describe()
         self.body.set_visibility(True)
         self.head.props("aria-expanded=true")
 
