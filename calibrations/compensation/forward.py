@@ -26,7 +26,7 @@ from calibrations.effects.logged import RATE
 from calibrations.errors import ModelError
 from calibrations.free_forms.effect import FreeForm
 from calibrations.model import Model, Term
-from calibrations.model.chain import Stage, Step, add_response, stage_contribution, stage_of
+from calibrations.model.chain import Stage, Step, add_response, output_order, stage_contribution, stage_of
 from calibrations.table import AXES, NUMBERS
 from calibrations.tables import KINDS
 
@@ -190,7 +190,7 @@ def _outputs(steps: Sequence[Step], runtime: RunTime) -> tuple[NodeArray, dict[s
     v, of_force, memory = _response_to_force(a, steps, table)
     force = add_response(a, of_force, steps) if any(effect.of_force and not effect.scales for effect, _ in steps) else a
     v = _scale(a, force, v, steps, table)
-    for effect, p in steps:
+    for effect, p in output_order(steps):
         if isinstance(effect, FreeForm) and "output" in effect.places:
             v = v + trace_free_form(effect, a, v, table, p)
         else:

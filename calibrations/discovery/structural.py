@@ -6,7 +6,7 @@ and so does a place without a cause: the error falls, and the cause remains unkn
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -173,16 +173,22 @@ def _fit_each_addition(base: Fit, best: _StructureFit, renew: bool) -> tuple[lis
     if renew:
         end = fit_together(base, selected)
     selected, fits = fit_one_by_one(base, selected, end)
-    return _without_idle_additions(selected, fits, best.structure.causes)
+    return _without_idle_additions(selected, fits, significant_causes(fits[-1], best.structure.causes))
+
+
+def significant_causes(end: Fit, causes: Sequence[str]) -> set[str]:
+    """The causes in the model of `end` whose values noise does not explain."""
+    in_model = [name for name in causes if end.model.holds(name)]
+    return {name for name in in_model if chance(*first_order_cost(end, name)) < SIGNIFICANT}
 
 
 def _without_idle_additions(
-    selected: list[Addition], fits: list[Fit], causes: Sequence[str]
+    selected: list[Addition], fits: list[Fit], causes: Collection[str]
 ) -> tuple[list[Addition], list[Fit]]:
     """The additions and fits without those, causes apart, that lower neither the error of the fit nor the unseen error.
 
-    Slow noise, or a free form beside them, describes their part as well. All are left out at once, or, where the unseen
-    error grows by that, one after another.
+    Slow noise, or a free form beside them, describes their part as well, or it is the product of two causes, of which
+    the search takes the sum. All are left out at once, or, where the unseen error grows by that, one after another.
     """
     base, end = fits[0], fits[-1]
     remaining = {

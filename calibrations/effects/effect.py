@@ -119,6 +119,7 @@ class Effect:
     contains   effects that it becomes where its shape vanishes
     exact      its form follows from geometry alone: no other effect refines it
     rounds     its output is a staircase, whose slope has no information
+    converts   it belongs to the output stage or the converter, and acts on the output after what belongs to the sensor
     left_out   why a compensation in the sensor's product cannot undo it; "" where it can
     incidental  no experiment is planned for it: there is no remark if a table cannot show it
     of_force   it adds what the sensor makes of the force, which changes of the sensitivity multiply
@@ -148,6 +149,7 @@ class Effect:
     contains: tuple[str, ...] = ()
     exact: bool = False
     rounds: bool = False
+    converts: bool = False
     left_out: str = ""
     incidental: bool = False
     of_force: bool = False
@@ -255,7 +257,8 @@ class Effect:
 METHODS = (*HOOKS, "follow", "columns", "lacks", "searched")
 TUPLES = ("needs", "kinds", "after", "contains")
 TYPES: Mapping[str, type] = {
-    "exact": bool, "rounds": bool, "left_out": str, "incidental": bool, "of_force": bool, "scales": bool, "memory": int,
+    "exact": bool, "rounds": bool, "converts": bool, "left_out": str, "incidental": bool, "of_force": bool,
+    "scales": bool, "memory": int,
 }  # fmt: skip
 MEMBERS = (*METHODS, *TUPLES, *TYPES)
 

@@ -184,6 +184,8 @@ class _OnResponse(FreeForm):
 class _AtOutput(FreeForm):
     """Adds to the output, over the output."""
 
+    converts = True
+
     def output(self, v: Array, table: Table, p: Values) -> Array:
         output = v.copy()
         for k in range(len(table.axes)):

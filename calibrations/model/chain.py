@@ -139,9 +139,14 @@ def convert_output(parts: Sequence[Array], n: int, table: Table, steps: Sequence
         from calibrations.motion.spectrum import sample_output  # only motion has spectra
 
         v = sample_output(v, table)
-    for effect, p in steps:
+    for effect, p in output_order(steps):
         v = effect.output(v, table, p)
     return v
+
+
+def output_order(steps: Sequence[Step]) -> list[Step]:
+    """The steps in the order in which they act on the output, whatever the order in which they were added."""
+    return sorted(steps, key=lambda step: (step[0].converts, step[0].rounds))
 
 
 def forward(table: Table, steps: Sequence[Step]) -> Array:
@@ -387,10 +392,10 @@ class LinearisedChain:
 
     def _read_out(self, change: Array) -> Array:
         """Change of the output, shape (n, axes), by a small change of the sum of all parts, (n, 3)."""
-        axes, n = len(self.table.axes), self.table.n
+        axes, half = len(self.table.axes), change / 2
         if self._needs_output_stage:
             plus, minus = (
-                convert_output([self._total + s * change / 2], n, self.table, self.steps) for s in (1.0, -1.0)
+                convert_output([self._total + h], self.table.n, self.table, self.steps) for h in (half, -half)
             )
             return np.asarray((plus - minus)[:, :axes])
         return np.asarray(self._slope * change[:, :axes])

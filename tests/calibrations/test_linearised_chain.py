@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 
@@ -93,3 +95,33 @@ def test_derivatives_of_magnitudes_are_those_of_the_way_back(
     for k, step in enumerate(steps):
         plain = (problem.residual(theta + step) - problem.residual(theta - step)) / (2 * step[k])
         np.testing.assert_allclose(found[:, :, k], plain, rtol=0, atol=1e-4 * np.max(np.abs(found[:, :, k])))
+
+
+CONVERSIONS = ("supply-sensitivity", "saturation", "quantisation")
+
+
+@pytest.mark.parametrize("order", list(permutations(CONVERSIONS)))
+def test_an_output_at_its_limit_does_not_follow_the_supply_in_whatever_order_effects_are_added(
+    order: tuple[str, ...],
+) -> None:
+    model = read_model("linear")
+    for name in order:
+        model = model.with_effect(catalogue()[name])
+    layout = make_problem(model, TABLE).layout
+    chosen = {
+        "bias": 2.5,
+        "scale": 1.0,
+        "share": 1.0,
+        "high": 3.2,
+        "low": 1.0,
+        "loss": 1.0,
+        "step": 1e-6,
+        "noise": 1e-5,
+    }
+    steps = layout.steps(np.array([chosen.get(slot.parameter.name, 0.0) for slot in layout.slots]))
+    output, supply = forward(TABLE, steps), TABLE.column("supply_v")
+    beyond = 2.5 + np.column_stack([AX, AY]) > 3.3
+    assert np.count_nonzero(beyond) > 4
+    np.testing.assert_allclose(output[beyond], 3.2, atol=1e-9)
+    within = np.abs(AX) < 0.6
+    np.testing.assert_allclose(output[within, 0] / (2.5 + AX[within]), supply[within] / supply.mean(), rtol=1e-6)

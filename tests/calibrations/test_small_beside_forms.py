@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from calibrations.discovery import structural
 from calibrations.discovery.additions import SMALL, Addition, start_small_at_forms
 from calibrations.effects.catalogue import catalogue
+from calibrations.fitting.fit import fit
 from calibrations.free_forms.bases import Spline
 from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.form import Form
 from calibrations.model import Estimate
+from calibrations.model.file import read_model
+from tests.calibrations import synthetic
 
 CURVE = Form("own-response", "curve", "own", (Spline(-1.1, 1.1, 8),), sizes=(1e-3, 1e-3))
 
@@ -49,3 +53,16 @@ def test_idle_additions_go_one_by_one_where_one_of_them_is_needed(monkeypatch: p
     monkeypatch.setattr(structural, "fit_successively", lambda base, end, additions: [end for _ in additions])
     kept, _ = structural._without_idle_additions([cause, needed, idle], fits, ["temperature-bias"])
     assert [a.effect.name for a in kept] == ["temperature-bias", "saturation"]
+
+
+def test_a_cause_whose_values_are_noise_in_the_fitted_model_is_not_significant() -> None:
+    columns = synthetic.turns((90, 30, 150))
+    a = np.column_stack(synthetic.components(columns))[:, :2]
+    model = read_model("linear")
+    causes = ("quadratic-nonlinearity", "hysteresis", "temperature-bias")
+    for name in causes[:2]:
+        model = model.with_effect(catalogue()[name])
+    end = fit(model, synthetic.poses(columns, *(2.5 + a + 2e-3 * a**2).T))
+    assert structural.significant_causes(end, causes) == {"quadratic-nonlinearity"}
+    both_act = 2.5 + a + 2e-3 * a**2 + 1e-3 * columns["direction"][:, None] * (1 - a**2)
+    assert structural.significant_causes(fit(model, synthetic.poses(columns, *both_act.T)), causes) == set(causes[:2])

@@ -17,6 +17,7 @@ class AdcNonlinearity(Effect):
     """
 
     after = ("bias", "scale-factor")
+    converts = True
 
     bow = Parameter("{out}", typical=0.002, per_axis=False, measured="y", doc="deviation at both ends, alike")
     bend = Parameter("{out}", typical=0.002, per_axis=False, measured="y", doc="deviation at both ends, opposite")

@@ -36,6 +36,7 @@ class Quantisation(Effect):
     left_out = "what was rounded off is lost"
     after = ("bias", "scale-factor")
     rounds = True
+    converts = True
 
     step = Parameter(
         "{out}",

@@ -21,6 +21,7 @@ class Saturation(Effect):
 
     kinds = ("poses",)
     after = ("bias", "scale-factor")
+    converts = True
 
     high = Parameter("{out}", typical=0.1, guess=lambda table: _levels(table, 1), doc="level above which it begins")
     low = Parameter("{out}", typical=0.1, guess=lambda table: _levels(table, -1), doc="level below which it begins")
