@@ -42,7 +42,6 @@ class Proposal:
 
     kind: str
     columns: Mapping[str, ColumnMapping | None]
-    doubt: Doubt | None = None  # about the unit of the time
 
 
 @dataclass(frozen=True)
@@ -74,10 +73,13 @@ def proposal(sheet: Sheet, kind: str | None = None) -> Proposal:
     target_names = column_names(kind)
     proposed = propose_mapping(sheet, "poses" if kind == "still" else kind, mapping)
     mappings = {m.file_column: m for m in proposed if m.name in target_names or m in mapping}
-    with_stated_unit = [
-        replace(m, unit=_header_unit(sheet, m.file_column)) if m.name == "t_s" else m for m in mappings.values()
-    ]
-    return Proposal(kind, {name: mappings.get(name) for name in sheet.header}, time_doubt(sheet, with_stated_unit))
+    return Proposal(kind, {name: mappings.get(name) for name in sheet.header})
+
+
+def doubt_of_time(sheet: Sheet, columns: Sequence[ColumnMapping]) -> Doubt | None:
+    """The doubt about the unit of the time with these columns; only the header of the file states one."""
+    with_stated_unit = [replace(m, unit=_header_unit(sheet, m.file_column)) if m.name == "t_s" else m for m in columns]
+    return time_doubt(sheet, with_stated_unit)
 
 
 def units_for(name: str) -> list[str]:

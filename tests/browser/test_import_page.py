@@ -112,6 +112,27 @@ def test_a_time_that_fits_minutes_is_asked_about(workbench: Workbench, tmp_path:
         assert record.columns(record.runs()[0].run)[0]["t_s"][-1] == pytest.approx(744.0)
 
 
+def test_what_a_person_chooses_has_the_unit_of_the_header_and_the_question_about_the_time(
+    workbench: Workbench, tmp_path: Path
+) -> None:
+    path = foreign(tmp_path, "Zeit")
+    head, _, rows = path.read_text().partition("\n")
+    names = {"inclination": "Winkel1 [deg]", "table": "Winkel2 [deg]", "Ux": "Kanal A / mV", "Uy": "Kanal B / mV"}
+    for theirs, german in names.items():
+        head = head.replace(theirs, german)
+    path.write_text(f"{head}\n{rows}")
+    page = workbench.visit(f"/import?file={quote(str(path))}")
+    meanings = ("alpha_deg", "beta_deg", "vx_v", "vy_v")
+    for german, meaning in zip(("Zeit", *names.values()), ("t_s", *meanings), strict=True):
+        choose(page, f"meaning of {german}", meaning)
+    expect(page.get_by_label("unit of Kanal A / mV")).to_have_value("mV")
+    question = page.get_by_role("group", name="Unit of the time")
+    expect(question).to_contain_text("It fits min.")
+    expect(page.get_by_role("button", name="Import", exact=True)).to_be_disabled()
+    choose(page, "unit of Kanal A / mV", "V")
+    expect(page.get_by_text("1500.08 to 3499.95 V")).to_be_visible()  # what is shown is what is used
+
+
 def test_a_file_that_needs_names_leads_from_the_model_page(workbench: Workbench, tmp_path: Path) -> None:
     page = workbench.visit(f"/?data={quote(str(foreign(tmp_path)))}")
     alert = page.get_by_role("alert")

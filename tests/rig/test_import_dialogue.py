@@ -15,7 +15,7 @@ import pytest
 from calibrations.importing.plausible import find_time_doubt
 from calibrations.importing.units import ColumnMapping
 from rig.record import Record
-from rig.services.importing import open_file, proposal
+from rig.services.importing import doubt_of_time, open_file, proposal
 
 THEIRS = "Takt;inclination;table;Ux\n" + "".join(f"{k};90;{30 * k};{2500 + k}\n" for k in range(12))
 
@@ -85,11 +85,13 @@ def test_a_time_that_no_stage_can_follow_is_proposed_in_minutes(tmp_path: Path) 
     rows = [f"{0.1 * k:.1f};{90 - 30 * (k // 12)};{30 * (k % 12)};{2500 + k}" for k in range(36)]
     text = "time;inclination;table;Ux\n" + "\n".join(rows)
     (path := tmp_path / "minutes.csv").write_text(text)
-    found = proposal(open_file(path))
-    assert found.columns["time"] == ColumnMapping("t_s", "time", "min")
-    assert found.doubt == ("runs from 0 to 3.5; in s this is 0.1 s from one pose to the next", "min")
+    columns = proposal(sheet := open_file(path)).columns
+    assert columns["time"] == ColumnMapping("t_s", "time", "min")
+    named = [m for m in columns.values() if m is not None]
+    assert doubt_of_time(sheet, named) == ("runs from 0 to 3.5; in s this is 0.1 s from one pose to the next", "min")
     path.write_text(text.replace("time;", "time (s);"))  # who states the unit is not asked
-    assert proposal(open_file(path)).doubt is None
+    stated = proposal(sheet := open_file(path)).columns
+    assert doubt_of_time(sheet, [m for m in stated.values() if m is not None]) is None
 
 
 def test_a_log_of_samples_and_slow_poses_have_no_doubt() -> None:

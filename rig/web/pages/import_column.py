@@ -24,6 +24,7 @@ class Column:
         """`look` shows what would be imported with the present choices."""
         self.file_column, self.look = file_column, look
         self.stated = ""
+        self.header_unit = ""
         self.proposed: Meaning = "", ""
         self.confirmed = False  # a person has answered a question about it
         with ui.element("tr"):
@@ -42,7 +43,8 @@ class Column:
         """Offer the names of a kind of table, and select the proposal."""
         self.name.set_options({UNUSED: "other", **{name: name for name in names}})
         self.name.set_value(proposed.name if proposed is not None and proposed.name in names else UNUSED)
-        self.stated, self.confirmed = stated_unit, False  # after the name, whose change forgets them
+        self.stated, self.header_unit = stated_unit, stated_unit  # after the name, whose change forgets them
+        self.confirmed = False
         self._offer_units(proposed.unit if proposed is not None else "")
         self.proposed = self.chosen
 
@@ -65,7 +67,8 @@ class Column:
 
     def _rename_column(self) -> None:
         self.stated, self.confirmed = "", False
-        self._offer_units("")
+        fits = self.header_unit in units_for(str(self.name.value or ""))
+        self._offer_units(self.header_unit if fits else "")
         self.look()
 
     def state(self, unit: str) -> None:
@@ -80,7 +83,7 @@ class Column:
         name, unit = str(self.name.value or ""), str(self.unit.value or "")
         if name == UNUSED:
             return None
-        is_default = unit == column_unit(name) and not self.stated
+        is_default = unit == column_unit(name) and not self.stated and self.header_unit in ("", unit)
         return ColumnMapping(name, self.file_column, "" if is_default else unit)
 
     @property

@@ -21,7 +21,16 @@ from calibrations.importing.topics import SeveralTopics
 from calibrations.importing.units import ColumnMapping, column_unit
 from calibrations.table import Constant
 from calibrations.text import unit as unit_text
-from rig.services.importing import Preview, data_chart, lacking, open_file, preview, proposal, store_sheet
+from rig.services.importing import (
+    Preview,
+    data_chart,
+    doubt_of_time,
+    lacking,
+    open_file,
+    preview,
+    proposal,
+    store_sheet,
+)
 from rig.services.page_words import IMPORT, address, page_step
 from rig.web.address import ModelState
 from rig.web.calculations import off_loop
@@ -191,14 +200,18 @@ class ImportPage:
         for name, field in self.fields.items():
             field.set_visibility(kind in CONSTANT_KINDS.get(name, KINDS))
         self.quiet = False
-        self.question.clear()
-        answered = any(unit for name, unit in self.restored.values() if name == TIME)
-        clock = next((column for column in self.columns.values() if column.name.value == TIME), None)
         self.restored = {}
-        self.asked = proposed.doubt is not None and clock is not None and not answered
-        if proposed.doubt is not None and clock is not None and self.asked:
-            self._ask_unit(clock, *proposed.doubt)
         self.look()
+
+    def _look_at_time(self) -> None:
+        """Ask for the unit of the time where the present columns leave it in doubt and no person has stated it."""
+        clock = next((column for column in self.columns.values() if column.name.value == TIME), None)
+        is_open = clock is not None and not (clock.confirmed and clock.stated)
+        doubt = doubt_of_time(self.sheet, self.mappings) if is_open else None
+        self.asked = doubt is not None
+        self.question.clear()
+        if clock is not None and doubt is not None:
+            self._ask_unit(clock, *doubt)
 
     def _ask_unit(self, clock: Column, doubt: str, fits: str) -> None:
         """Ask for the unit of the time; nothing is imported before the answer."""
@@ -207,13 +220,8 @@ class ImportPage:
             words(f"It {doubt}; no stage does that." + (f" It fits {fits}." if fits else ""), "quiet")
             with div("row-of"):
                 for unit in TIMES:
-                    button = ui.button(unit, on_click=partial(self._answer, clock, unit)).props("no-caps")
+                    button = ui.button(unit, on_click=partial(clock.state, unit)).props("no-caps")
                     button.props("" if unit == fits else "outline")
-
-    def _answer(self, clock: Column, unit: str) -> None:
-        self.asked = False
-        self.question.clear()
-        clock.state(unit)
 
     @property
     def mappings(self) -> list[ColumnMapping]:
@@ -258,6 +266,7 @@ class ImportPage:
         if lacks := lacking(sheet, kind, mappings):
             self._show_fault("", f"Still needed: {', '.join(lacks)}. Choose the columns that hold them.")
             return
+        self._look_at_time()
         try:
             preview_table = await off_loop(preview, self.sheet, kind, mappings, self.constants)
         except Exception as error:

@@ -94,7 +94,7 @@ class CertificateDialog(DocumentDialog):
         subject = CertificateInput(
             session.request.data,
             session.data.table,  # type: ignore[attr-defined] # the button is enabled for rows
-            session.end.model if session.steps else session.model,
+            session.complete_model() if session.steps else session.model,  # its provenance: values from these data
             session.end.model.name,
             session.effects,
             read_bench(self.bench_file) if self.bench_file is not None else None,
