@@ -247,7 +247,7 @@ def test_a_run_of_a_terminal_is_stopped_from_elsewhere() -> None:
     ended = control.latest()
     assert ended is not None
     assert (ended.phase, ended.state) == ("ended", "stopped")
-    assert "stopped by another program (SIGTERM)" in ended.error
+    assert "stopped on the page Run or by another program (SIGTERM)" in ended.error
 
 
 def test_what_a_terminal_asks_is_answered_there() -> None:
