@@ -173,7 +173,10 @@ def _fit_each_addition(base: Fit, best: _StructureFit, renew: bool) -> tuple[lis
     if renew:
         end = fit_together(base, selected)
     selected, fits = fit_one_by_one(base, selected, end)
-    return _without_idle_additions(selected, fits, significant_causes(fits[-1], best.structure.causes))
+    curves = {a.effect.name.removeprefix(PREFIX) for a in best.forms}
+    beside_curve = {cause for place in best.structure.places if place.name in curves for cause in place.causes}
+    needed_causes = beside_curve | significant_causes(fits[-1], best.structure.causes)
+    return _without_idle_additions(selected, fits, needed_causes)
 
 
 def significant_causes(end: Fit, causes: Sequence[str]) -> set[str]:

@@ -129,11 +129,26 @@ class Judgement(Evidence):
 
     @property
     def summary(self) -> str:
-        """The text, or a short sentence: that the added effects complete the model, or how many effects are missing."""
+        """The text, or a short sentence: that the added effects complete the model, or how many effects are missing.
+
+        Of many effects, or beside many added ones, it gives the numbers.
+        """
         if self._complete:
             return "No effect is missing."
-        is_long = len(self.missing) > MOST_NAMED and self.verdict in (Verdict.EFFECT_MISSING, Verdict.AMBIGUOUS)
-        return f'The model "{self.model}" misses {len(self.missing)} effects.' if is_long else self.text
+        base, *terms = self.model.split("+")
+        is_grown = len(terms) > MOST_NAMED
+        model = f"{base} with {len(terms)} added effects" if is_grown else self.model
+        if self.verdict not in (Verdict.EFFECT_MISSING, Verdict.AMBIGUOUS):
+            return self.text
+        if len(self.missing) > MOST_NAMED:
+            of_form = sum(name in self.refinements for name in self.missing)
+            form = f", {of_form} of them only for the exact form of the others" if of_form else ""
+            return f'The model "{model}" misses {len(self.missing)} effects{form}.'
+        if self.missing and is_grown:
+            return f'The model "{model}" misses {join_words(self.missing)}.'
+        if len(self.added) > MOST_NAMED:
+            return f"{len(self.added)} effects are added. Remaining error: {self.error:.3g} times {self.floor}."
+        return self.text
 
     @property
     def rest(self) -> str:

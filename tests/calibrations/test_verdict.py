@@ -55,6 +55,22 @@ def test_effects_that_complete_a_model_are_not_called_missing_from_it(clean: Dia
     assert Judgement(model="linear", missing=("a",)).rest == ""
 
 
+def test_many_effects_are_counted_in_the_short_sentence_and_named_in_the_rest() -> None:
+    many = tuple("abcdefg")
+    grown = "+".join(("linear", *many))
+    added = Judgement(model="linear", added=many, error=1.3, left="a trend", share_left=1e-4)
+    assert added.summary == "7 effects are added. Remaining error: 1.3 times the noise floor."
+    few = Judgement(model=grown, missing=("h",), added=many)
+    assert few.summary == 'The model "linear with 7 added effects" misses h.'
+    formed = Judgement(model=grown, missing=many, refinements=("a", "b"))
+    assert formed.summary == (
+        'The model "linear with 7 added effects" misses 7 effects, 2 of them only for the exact form of the others.'
+    )
+    assert all(judgement.rest == judgement.text for judgement in (added, few, formed))
+    short = Judgement(model="linear", missing=("a",))
+    assert (short.summary, short.rest) == (short.text, "")
+
+
 def test_an_effect_that_noise_may_explain_as_well_is_no_form_of_a_cause() -> None:
     text = Judgement(model="linear", refinements=("bias-drift",)).text
     assert "The model also has bias-drift, which noise may explain as well." in text
