@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 SIGNAL_SOURCES = {
     "SIGINT": "stopped by a person (SIGINT)",
-    "SIGTERM": "stopped on the page Run or by another program (SIGTERM)",
+    "SIGTERM": "stopped by the page Run or by another program (SIGTERM)",
     "SIGHUP": "stopped because its terminal was closed (SIGHUP)",
 }
 COMPILED_PACKAGE = "drivers.world"  # its compiled code calls Python generators; an exception there would break it

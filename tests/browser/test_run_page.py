@@ -111,7 +111,7 @@ def test_a_run_of_a_terminal_is_watched_and_stopped(workbench: Workbench) -> Non
         expect(page.get_by_role("button", name="Pause")).to_have_count(0)
         page.get_by_role("button", name="Stop").first.click()
         phase(page, "stopped")
-        assert "stopped on the page Run or by another program (SIGTERM)" in terminal.communicate(timeout=60)[1]
+        assert "stopped by the page Run or by another program (SIGTERM)" in terminal.communicate(timeout=60)[1]
     assert terminal.returncode == 4
 
 

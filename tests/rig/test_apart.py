@@ -137,7 +137,9 @@ def test_many_wishes_for_a_pause_are_one_pause() -> None:
             control.answer(paused, "resume")
         control.stop(when("running", lambda status: status.done > done))
 
-    assert carried_out("soak", {"duration_s": "43200"}, person).error.startswith("stopped by another program")
+    assert carried_out("soak", {"duration_s": "43200"}, person).error.startswith(
+        "stopped by the page Run or by another program"
+    )
 
 
 def test_a_wish_for_a_pause_while_the_run_connects_again_pauses_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -247,7 +249,7 @@ def test_a_run_of_a_terminal_is_stopped_from_elsewhere() -> None:
     ended = control.latest()
     assert ended is not None
     assert (ended.phase, ended.state) == ("ended", "stopped")
-    assert "stopped on the page Run or by another program (SIGTERM)" in ended.error
+    assert "stopped by the page Run or by another program (SIGTERM)" in ended.error
 
 
 def test_what_a_terminal_asks_is_answered_there() -> None:
