@@ -195,7 +195,7 @@ def _without_idle_additions(
     """
     base, end = fits[0], fits[-1]
     remaining = {
-        addition.effect.name: after.pooled_excess / before.pooled_excess
+        addition.effect.name: after.pooled_excess / before.pooled_excess if before.pooled_excess > 0 else 1.0
         for addition, (before, after) in zip(selected, pairwise(fits), strict=True)
         if addition.effect.name not in causes
     }
