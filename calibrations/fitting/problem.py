@@ -18,7 +18,8 @@ from calibrations.fitting.table_noise import scatter
 from calibrations.geometry.smooth import smooth_columns
 from calibrations.means.noise import Processes, white_std
 from calibrations.model import Model
-from calibrations.model.chain import LinearisedChain, Step, force, forward
+from calibrations.model.chain import Step, force, forward
+from calibrations.model.linearised_chain import LinearisedChain
 from calibrations.model.parameters import Layout
 from calibrations.table import Array, Table
 

@@ -20,7 +20,8 @@ from calibrations.errors import DataError, ModelError, TooFewRows
 from calibrations.fitting.problem import Problem
 from calibrations.means.noise import norm_std, rms
 from calibrations.model import Model
-from calibrations.model.chain import LinearisedChain, Step, backward, magnitude_by_output, sensed, slope_at
+from calibrations.model.chain import Step, backward, magnitude_by_output, sensed, slope_at
+from calibrations.model.linearised_chain import LinearisedChain
 from calibrations.model.parameters import Layout
 from calibrations.table import Array, Table
 from calibrations.tables import FITTED_KINDS

@@ -13,8 +13,9 @@ from calibrations.fitting.problem_kinds import make_problem
 from calibrations.free_forms.bases import spline
 from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.form import TILT, TURNED, Form
-from calibrations.model.chain import LinearisedChain, forward
+from calibrations.model.chain import forward
 from calibrations.model.file import read_model
+from calibrations.model.linearised_chain import LinearisedChain
 from calibrations.table import Table
 from tests.calibrations import synthetic, test_common_floor
 
