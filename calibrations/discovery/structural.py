@@ -188,10 +188,11 @@ def significant_causes(end: Fit, causes: Sequence[str]) -> set[str]:
 def _without_idle_additions(
     selected: list[Addition], fits: list[Fit], causes: Collection[str]
 ) -> tuple[list[Addition], list[Fit]]:
-    """The additions and fits without those, causes apart, that lower neither the error of the fit nor the unseen error.
+    """The additions and fits without those that lower neither the error of the fit nor the unseen error.
 
     Slow noise, or a free form beside them, describes their part as well, or it is the product of two causes, of which
     the search takes the sum. All are left out at once, or, where the unseen error grows by that, one after another.
+    `causes` are kept.
     """
     base, end = fits[0], fits[-1]
     remaining = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 from rig.drawings import svg
 from rig.drawings.attitude import Attitude
@@ -17,6 +18,7 @@ def page(attitude: Attitude) -> str:
     return svg.document(WIDTH, HEIGHT, attitude.words, _content(attitude))
 
 
+@lru_cache(maxsize=8)
 def strip(attitude: Attitude) -> str:
     """The three views side by side, for a page: legible at the width of a tablet."""
     return svg.document(STRIP_WIDTH, STRIP_HEIGHT, attitude.words, _side_by_side(attitude))

@@ -379,7 +379,7 @@ def test_the_status_of_a_run_by_hand_has_the_guidance_and_no_stage(rig_home: Pat
     assert (guidance.text, len(guidance.taken), guidance.moves) == ("position 2: +x side up", 1, True)
     assert orientation_drawing(guidance) == orientation_drawing(Guidance(guidance.text, (1.0, 0.0, 0.0), (UP,)))
     prepared = (before_start(planned, read_bench(HAND)), before_resume("a run", "hand-positions", None))
-    assert all(each.drawing == "" for each in prepared)
+    assert all(each.attitude is None for each in prepared)
     assert all("upside down" in each.checks[0] for each in prepared)
 
 

@@ -256,6 +256,7 @@ class ImportPage:
 
     async def _preview(self) -> None:
         self._tell_address()
+        self._look_at_time()
         self.turn += 1
         turn, kind, mappings = self.turn, str(self.kind.value), self.mappings
         names = [m.name for m in mappings]
@@ -266,7 +267,6 @@ class ImportPage:
         if lacks := lacking(sheet, kind, mappings):
             self._show_fault("", f"Still needed: {', '.join(lacks)}. Choose the columns that hold them.")
             return
-        self._look_at_time()
         try:
             preview_table = await off_loop(preview, self.sheet, kind, mappings, self.constants)
         except Exception as error:

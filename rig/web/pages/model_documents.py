@@ -98,7 +98,7 @@ class CertificateDialog(DocumentDialog):
             session.end.model.name,
             session.effects,
             read_bench(self.bench_file) if self.bench_file is not None else None,
-            str(self.before.value) or None,
+            str(self.before.value) or (session.request.model if session.steps else None),
         )
         document = certified(subject, str(self.number.value or "").strip(), str(self.customer.value or "").strip())
         failed = failed_results(document)

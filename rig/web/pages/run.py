@@ -18,14 +18,16 @@ from procedures.settings import choices, meaning, parse, setting_text
 from rig.bench import Bench, read_bench
 from rig.bench.certificates import find_expired
 from rig.bench.file import DEMO
+from rig.drawings import strip
 from rig.errors import RigError
 from rig.instruments.instruments import check_all
 from rig.planning.plan import Plan, plan, stretches
+from rig.planning.preparation import mounting
 from rig.runs.background import control
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import Desk, lab_read
 from rig.web.frame import Key, frame
-from rig.web.pages.run_begin import BeginDialog, Preparation, before_start, plan_facts
+from rig.web.pages.run_begin import BeginDialog, before_start, plan_facts
 from rig.web.pages.run_live import Live
 from rig.web.pages.run_optimal import OptimalDialog
 from rig.web.parts import box, button, div, facts, message, setting_label, show_error, shown, table, words
@@ -143,7 +145,7 @@ class PlanForm:
         self.given = {name: value for name, value in settings.items() if name != "procedure"}
         self.started: Callable[[], Awaitable[None]] | None = None
         self.turn, self.address, self.visit = 0, "", Visit()
-        self.preparation: Preparation | None = None
+        self.planned: Plan | None = None
         names = {name: f"{name}: {summary(path)}" for name, path in paths(bench.folders.procedures).items()}
         selected = settings.get("procedure", DEFAULT_PROCEDURE)
         with box():
@@ -218,7 +220,7 @@ class PlanForm:
     async def replan(self) -> None:
         """Plan the run with the present settings."""
         self.turn += 1
-        turn, self.preparation = self.turn, None
+        turn, self.planned = self.turn, None
         self.button.disable()
         self._tell_address()
         self.visit.cancel()  # a plan of other settings, which can take minutes
@@ -226,15 +228,16 @@ class PlanForm:
         title = "This procedure cannot run"
         planned = await shown(self.plan, "Planning; nothing moves", title, work, lambda: turn == self.turn)
         if planned is not None:
-            shown_plan, self.preparation = planned
+            self.planned = planned
             self.button.enable()
             with self.plan:
-                _show(shown_plan, self.bench)
+                _show(planned, self.bench)
 
-    def _plan(self, procedure: Procedure, settings: Mapping[str, str]) -> tuple[Plan, Preparation]:
-        """The plan, and the checks before its start: their drawing takes a while, and Start answers at once."""
+    def _plan(self, procedure: Procedure, settings: Mapping[str, str]) -> Plan:
         planned = plan(self.bench, procedure, parse(procedure, settings))
-        return planned, before_start(planned, self.bench)
+        if planned.reach:
+            strip(mounting(planned))  # drawn and kept before a person clicks on Start
+        return planned
 
     def start(self) -> None:
         """Open the checks before the run; their Begin starts it."""
@@ -247,11 +250,11 @@ class PlanForm:
         if under_way is not None and under_way.phase != "ended":
             ui.notify(f"{under_way.procedure} is running; stop it first", type="warning")
             return
-        if self.preparation is None:  # a click that was on its way while a setting changed
+        if self.planned is None:  # a click that was on its way while a setting changed
             ui.notify("The plan is not ready; press Start again when it is shown", type="warning")
             return
         name, settings = str(self.name.value), self.settings()
-        BeginDialog(self.preparation, partial(self._begin, name, settings))
+        BeginDialog(before_start(self.planned, self.bench), partial(self._begin, name, settings))
 
     async def _begin(
         self, name: str, settings: Mapping[str, str], sensor: Mapping[str, str], answers: Mapping[str, str]

@@ -23,7 +23,7 @@ class Preparation:
     title: str
     facts: Mapping[str, str]
     checks: Sequence[str]
-    drawing: str  # SVG of the sensor's first position; "" if the sensor is in a hand
+    attitude: Attitude | None  # None: the sensor is in a hand
     sensor: Mapping[str, str] | None = None  # name and serial number; None: they cannot be changed
     answers: Mapping[str, str] = field(default_factory=dict)
 
@@ -38,7 +38,7 @@ def before_start(plan: Plan, bench: Bench) -> Preparation:
         f"{plan.procedure} on {bench.name}",
         batch | plan_facts(plan, bench),
         [*by_hand, *([question.text] if question is not None else [])],
-        strip(mounting(plan)) if plan.reach else "",
+        mounting(plan) if plan.reach else None,
         sensor,
         {question.name: "yes"} if question is not None else {},
     )
@@ -50,10 +50,8 @@ def before_resume(run: str, procedure: str, attitude: Attitude | None) -> Prepar
         "The cables can follow the stages over the whole range, and nothing and nobody is within their reach",
         "The sensor is fastened as before, as in the drawing",
     )
-    title, by_hand = f"Resume {procedure} {run}", [capital(line) for line in HAND_CHECKS]
-    return (
-        Preparation(title, {}, by_hand, "") if attitude is None else Preparation(title, {}, by_stages, strip(attitude))
-    )
+    by_hand = [capital(line) for line in HAND_CHECKS]
+    return Preparation(f"Resume {procedure} {run}", {}, by_hand if attitude is None else by_stages, attitude)
 
 
 def plan_facts(plan: Plan, bench: Bench) -> dict[str, str]:
@@ -90,9 +88,9 @@ class BeginDialog:
         self.content, self.begin = content, begin
         with dialog_with_name(content.title).props("no-backdrop-dismiss") as self.dialog, ui.card().classes("begin"):
             words(content.title, "title")
-            if content.drawing:
+            if content.attitude is not None:
                 with div("attitude"):
-                    ui.html(content.drawing, sanitize=False)
+                    ui.html(strip(content.attitude), sanitize=False)
             with div("two"):
                 with div("stack"):
                     self._sensor()
