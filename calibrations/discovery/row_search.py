@@ -167,7 +167,8 @@ class RowSearch:
         structural = search_structure(start, effects, path.ranked if start.noise.known else ())
         if structural.steps and path.steps and _cross_validated(path.end) <= _cross_validated(structural.end):
             return self._path_findings(path, effects, origin)  # the larger model must predict better
-        findings = self._structural_findings(structural, outliers, structural.start if origin is start else origin)
+        origin = structural.start if origin is start else origin.in_floor(structural.end.noise.floor)
+        findings = self._structural_findings(structural, outliers, origin)
         if not (findings.steps or path.steps) and structure_of(path.end) is None:
             return self._path_findings(path, effects, origin)  # slow noise looks like a pattern in white noise
         return findings

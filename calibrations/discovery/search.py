@@ -108,7 +108,7 @@ def extend_path(path: Path, effects: Mapping[str, Effect], max_steps: int = MOST
             break
         steps.append(step)
         present = step.after
-        if not present.residual_is_noise and present.share_left(path.start) <= 0:
+        if present.noise.known and present.share_left(path.start) <= 0:
             break
         ranked = candidates(present, effects)
     return Path(path.start, tuple(steps), tuple(ranked), path.outliers)
@@ -122,7 +122,7 @@ def continue_path(path: Path, effects: Mapping[str, Effect]) -> Path:
 
 def in_final_floor(path: Path, end: Fit) -> Path:
     """The path with all errors in multiples of the residual of `end`, if that residual is the only measure of noise."""
-    if not end.residual_is_noise:
+    if end.noise.known:
         return path
     floor = end.noise.scatter
     times = float(rms(path.end.noise.floor) / rms(floor))

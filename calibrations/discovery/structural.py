@@ -86,6 +86,8 @@ class StructuralSearch:
 
         `ranked`: the candidates on `start`, if they are known.
         """
+        floor = fits[-1].noise.scatter
+        start, fits = start.in_floor(floor), [each.in_floor(floor) for each in fits]
         steps = _steps(start, freed, fits[0], effects)
         steps += [Step(a.effect.name, *pair) for a, pair in zip(added, pairwise(fits), strict=True)]
         if not ranked:
@@ -174,9 +176,17 @@ def _fit_each_addition(base: Fit, best: _StructureFit, renew: bool) -> tuple[lis
         end = fit_together(base, selected)
     selected, fits = fit_one_by_one(base, selected, end)
     curves = {a.effect.name.removeprefix(PREFIX) for a in best.forms}
-    beside_curve = {cause for place in best.structure.places if place.name in curves for cause in place.causes}
-    needed_causes = beside_curve | significant_causes(fits[-1], best.structure.causes)
-    return _without_idle_additions(selected, fits, needed_causes)
+    with_curve = [place.causes for place in best.structure.places if place.name in curves]
+    significant = significant_causes(fits[-1], best.structure.causes)
+    return _without_idle_additions(selected, fits, needed_causes(with_curve, significant))
+
+
+def needed_causes(with_curve: Sequence[Sequence[str]], significant: set[str]) -> set[str]:
+    """The significant causes, and those of each place `with_curve` that has none of them.
+
+    The curve of a place describes what its cause does as well; beside a significant cause it describes the others.
+    """
+    return significant.union(*(causes for causes in with_curve if not significant & set(causes)))
 
 
 def significant_causes(end: Fit, causes: Sequence[str]) -> set[str]:

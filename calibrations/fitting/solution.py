@@ -1,7 +1,7 @@
 """The solution of a least-squares problem under given noise, and the figures that follow from it.
 
-The error on unseen poses is that of a cross-validation over poses, to first order about the full fit. All rows of one
-pose (both directions, repeats) are left out together, so that a left-out pose is truly unseen.
+The error on unseen poses is that of a cross-validation over poses, to first order about the full fit where that is
+enough. All rows of one pose (both directions, repeats) are left out together, so that a left-out pose is truly unseen.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from calibrations.table import Array, Table
 
 FOLDS, MOST_FOLDS = 10, 60  # of poses, and of rows
 BOUND_ROUNDS = 8
+FAR = 1.05  # of the generalised cross-validation: a larger error on unseen rows is that of few rows
 RIDGE = 1e-12  # of the products of normalised columns: some may be the same
 
 
@@ -63,8 +64,14 @@ class Solution:
         """Pooled rms of the error on unseen rows over the noise floor.
 
         It is at least that on the rows of the fit. Where the linear step promises less, the fit is not at a minimum.
+        Where the linear step goes far, a fit without the rows takes its place.
         """
-        return max(self.held_out_with(np.zeros((*self.residual.shape, 0))), self.pooled_excess)
+        error = self.held_out_with(np.zeros((*self.residual.shape, 0)))
+        if error > FAR * self.cross_validated_excess and not self.problem.adds:
+            from calibrations.fitting.refitted import unseen_error  # few models need it
+
+            error = unseen_error(self)
+        return max(error, self.pooled_excess)
 
     def held_out_with(self, extra: Array) -> float:
         """The held-out error with columns (channels, n, k) added to the fit."""
@@ -104,17 +111,13 @@ class Solution:
             return max(self.cross_validated_excess**2 - 1, 0.0) / max(start.cross_validated_excess**2 - 1, 1e-9)
         return max(self.pooled_excess**2 - 1, 0.0) / max(start.pooled_excess**2 - 1, 1e-9)
 
-    @property
-    def residual_is_noise(self) -> bool:
-        """Whether the residual itself is the only measure of noise: neither samples nor smooth columns give one."""
-        return not self.noise.known and not self.problem.smooth.size
-
     def in_floor(self, floor: Array) -> Self:
-        """The solution with the noise floor (channels,) of another model, if its own floor is its residual.
+        """The solution with the noise floor (channels,) of another model, if only its residual measures its noise.
 
-        All models of a search share one floor. With a floor of its own each, no two would be comparable.
+        All models of a search share one floor. With a floor of its own each, no two would be comparable: without what
+        is smooth over the angles, a residual still holds what follows the time or a temperature.
         """
-        return replace(self, noise=replace(self.noise, reference=floor)) if self.residual_is_noise else self
+        return self if self.noise.known else replace(self, noise=replace(self.noise, reference=floor))
 
     def in_white_noise(self) -> Self:
         """The solution with the white noise of its rows as its floor, if that noise is known.

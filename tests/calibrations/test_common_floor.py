@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from calibrations.effects.catalogue import catalogue
 from calibrations.loop import add, diagnose, discover
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
+from tests.calibrations import synthetic
 
 BENDING = (
     "bias", "scale-factor", "cross-axis-bias", "cubic-nonlinearity", "odd-quadratic-nonlinearity", "z-axis-bias",
@@ -68,3 +71,27 @@ def test_no_effect_is_added_that_makes_a_magnitude_of_anything() -> None:
     falls(found)
     scales = next(term.estimates for term in found.end.model.terms if term.name == "scale-factor")
     np.testing.assert_allclose([e.value / 9.81 for e in scales], [1.02, 0.99, 1.01], atol=0.01)
+
+
+def mixed_poses(of_time: Array) -> Table:
+    """104 poses in random order whose scale factor follows `of_time`; no column tells the noise of 50 uV."""
+    columns = synthetic.turns((90, 30, 150, 60), step_deg=30.0)
+    mixed = np.random.default_rng(5).permutation(len(columns["t_s"]))
+    columns |= {name: columns[name][mixed] for name in ("alpha_deg", "beta_deg", "direction")}
+    x, y, _ = synthetic.components(columns)
+    told = synthetic.poses(columns, 2.5 + x * (1 + of_time), 2.5 + y * (1 + of_time))
+    return replace(told, columns={name: column for name, column in told.columns.items() if name != "n"})
+
+
+def test_a_scale_factor_that_warms_up_is_found_in_mixed_poses_of_unknown_noise() -> None:
+    """The sign of what it adds changes from pose to pose, as that of noise does."""
+    found = discover(mixed_poses(4e-3 * np.exp(-np.arange(104) / 15.0)), read_model("linear"))
+    assert found.causes == ("warm-up-scale",)
+    assert found.start.pooled_excess > 8
+    assert found.end.pooled_excess < 1.2
+
+
+def test_mixed_poses_of_unknown_noise_and_a_linear_sensor_miss_nothing() -> None:
+    found = discover(mixed_poses(np.zeros(104)), read_model("linear"))
+    assert found.causes == ()
+    assert found.verdict == "adequate"

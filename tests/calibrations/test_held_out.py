@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy
 
 from calibrations.discovery.structure import _likelihood_with_effects, likelihood, without_slow
+from calibrations.effects.catalogue import catalogue
+from calibrations.fitting import refitted
 from calibrations.fitting.fit import fit, refit
 from calibrations.fitting.solution import folds, held_out
 from calibrations.free_forms.bases import spline
@@ -14,7 +17,7 @@ from calibrations.free_forms.form import Form
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.means.noise import white_only
 from calibrations.model.file import read_model
-from calibrations.table import Table
+from calibrations.table import Array, Table
 from tests.calibrations import synthetic
 
 
@@ -146,3 +149,33 @@ def test_parameters_that_their_priors_hold_do_not_count_whole() -> None:
     by_all = likelihood(squares, len(found.theta) - len(start.theta), white)
     fewer = len(found.theta) - found.effective_parameters
     assert _likelihood_with_effects(found, white) == pytest.approx(by_all + fewer * np.log(rows))
+
+
+def test_unseen_poses_that_alone_determine_a_parameter_are_predicted_by_fits_without_them() -> None:
+    """A limit that few of the largest outputs reach: two of y. The linear step without these goes far beyond a fit."""
+    columns = synthetic.turns((90, 30, 150, 60, 120), step_deg=30.0)
+    x, y, _ = synthetic.components(columns)
+    model = read_model("linear").with_effect(catalogue()["saturation"])
+    found = fit(model, synthetic.poses(columns, 2.5 + np.minimum(x, 0.9), 2.5 + np.minimum(y, 0.97)))
+    by_linear_steps = found.held_out_with(np.zeros((*found.residual.shape, 0)))
+    assert by_linear_steps > 2.0
+    assert found.held_out_excess < 1.1
+    layout, number = found.problem.layout, folds(found.table)
+    for k in np.unique(number):
+
+        def others(theta: Array, kept: Array = number != k) -> Array:
+            of_rows = found.problem.residual(theta) / found.noise.floor[:, None] * kept
+            return np.append(of_rows, (theta - found.theta) / layout.typical)
+
+        least = scipy.optimize.least_squares(others, found.theta, bounds=layout.bounds, x_scale=layout.typical).cost
+        without = refitted._without_rows(found, number == k)
+        assert float(np.sum(others(without) ** 2)) / 2 == pytest.approx(least, abs=0.05)
+
+
+def test_a_model_that_only_adds_needs_no_fit_without_the_poses(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One linear step is such a fit there."""
+    columns = synthetic.turns((90,), step_deg=90.0)
+    x, y, _ = synthetic.components(columns)
+    found = fit(read_model("linear"), synthetic.poses(columns, 2.5 + x, 2.5 + y))
+    monkeypatch.setattr(refitted, "unseen_error", None)
+    assert found.held_out_excess > 1.05 * found.cross_validated_excess

@@ -66,3 +66,9 @@ def test_a_cause_whose_values_are_noise_in_the_fitted_model_is_not_significant()
     assert structural.significant_causes(end, causes) == {"quadratic-nonlinearity"}
     both_act = 2.5 + a + 2e-3 * a**2 + 1e-3 * columns["direction"][:, None] * (1 - a**2)
     assert structural.significant_causes(fit(model, synthetic.poses(columns, *both_act.T)), causes) == set(causes[:2])
+
+
+def test_beside_the_curve_of_a_place_only_a_significant_cause_is_needed_or_all_where_none_is() -> None:
+    with_curve = [("saturation", "quadratic-nonlinearity"), ("adc-nonlinearity",)]
+    needed = structural.needed_causes(with_curve, {"saturation", "temperature-bias"})
+    assert needed == {"saturation", "temperature-bias", "adc-nonlinearity"}
