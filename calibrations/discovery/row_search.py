@@ -239,7 +239,7 @@ class RowSearch:
         if (reason := rejection(end)) is not None:
             return self.rejected(start, reason)
         pattern = find_competing_pattern(start, end, structural.causes_alone if structural.causes else None)
-        remainder = pattern or _material_structure(end)
+        remainder = pattern or _material_structure(end) or poorly_predicted(end)
         if remainder is None and any(place.unknown for place in structural.places):
             remainder = structure_of(structural.causes_alone)
         candidate_names = {c.name for c in structural.candidates}

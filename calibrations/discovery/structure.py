@@ -181,10 +181,19 @@ def _excess_noise(fit: Fit) -> Pattern | None:
 
 
 def poorly_predicted(fit: Fit) -> Pattern | None:
-    """The error on unseen stretches of a motion, if it is far above the noise: effects can fit few stretches alone."""
-    if not fit.table.type.moving or fit.held_out_excess <= MOST_UNSEEN:
+    """The error on unseen stretches of a motion, or on unseen poses, where the model follows the rows of its fit alone.
+
+    Effects can fit each of a few stretches alone. Of poses, the generalised cross-validation has to show it as well: a
+    large error on unseen poses may be that of one pose, which alone determines a parameter.
+    """
+    if fit.table.type.moving:
+        rows, is_poor = "stretches", fit.held_out_excess > MOST_UNSEEN
+    else:
+        rows, seen = "poses", max(fit.pooled_excess, 1.0)
+        is_poor = fit.cross_validated_excess > MATERIAL * seen and fit.held_out_excess > MOST_UNSEEN * seen
+    if not is_poor:
         return None
-    text = f"the error on unseen stretches is {fit.held_out_excess:.2g} times the noise floor"
+    text = f"the error on unseen {rows} is {fit.held_out_excess:.2g} times the noise floor"
     return Pattern(text, np.zeros((0, 0, 0)))
 
 

@@ -105,8 +105,29 @@ def test_only_a_motion_with_a_large_error_on_unseen_stretches_is_doubtful(
     moving: bool, factor: float, doubtful: bool
 ) -> None:
     table = SimpleNamespace(type=SimpleNamespace(moving=moving))
-    fitted = SimpleNamespace(table=table, held_out_excess=factor * MOST_UNSEEN)
+    error = factor * MOST_UNSEEN
+    fitted = SimpleNamespace(table=table, held_out_excess=error, cross_validated_excess=1.0, pooled_excess=0.98)
     assert (poorly_predicted(fitted) is not None) == doubtful
+
+
+@pytest.mark.parametrize(
+    ("seen", "cross_validated", "unseen", "doubtful"),
+    [
+        (0.7, 1.4, 27.0, True),  # half of the freedom of the rows is in the parameters
+        (0.99, 1.01, 6.8, False),  # one pose alone reaches the limit of a saturation
+        (1.4, 1.5, 1.9, False),  # slow noise, which every row has
+    ],
+)
+def test_a_model_that_follows_the_poses_of_its_fit_alone_is_doubtful(
+    seen: float, cross_validated: float, unseen: float, doubtful: bool
+) -> None:
+    table = SimpleNamespace(type=SimpleNamespace(moving=False))
+    fitted = SimpleNamespace(
+        table=table, pooled_excess=seen, cross_validated_excess=cross_validated, held_out_excess=unseen
+    )
+    pattern = poorly_predicted(fitted)
+    assert (pattern is not None) == doubtful
+    assert pattern is None or pattern.text == "the error on unseen poses is 27 times the noise floor"
 
 
 @pytest.mark.parametrize(("known", "factor", "doubted"), [(True, 1.1, True), (True, 0.9, False), (False, 1.1, False)])
