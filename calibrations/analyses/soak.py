@@ -243,7 +243,7 @@ class Soak:
     @cached_property
     def holds(self) -> Table:
         """The blocks of the still record."""
-        return self.table.rows(_rows_of(self.table, HOLD))
+        return self.table.rows(np.array([path.startswith(HOLD) for path in self.table.labels["path"]]))
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -374,7 +374,3 @@ def _lengths_s(table: Table) -> Array:
 
 def _rate_hz(table: Table) -> float:
     return table.number("sample_rate_hz", 1.0)
-
-
-def _rows_of(table: Table, kind: str) -> NDArray[np.bool_]:
-    return np.array([path.startswith(kind) for path in table.labels["path"]])

@@ -177,13 +177,9 @@ def _square(x: Interval) -> Interval:
     return _outward(np.where((x.low <= 0) & (x.high >= 0), 0.0, ends.min(axis=0)), ends.max(axis=0))
 
 
-def _hull(x: Interval, y: Interval) -> Interval:
-    return Interval(np.minimum(x.low, y.low), np.maximum(x.high, y.high))
-
-
 def _pick(first: Flags, second: Flags, x: Interval, y: Interval) -> Interval:
     """x where the first flag is sure, y where the second is, else their hull."""
-    hull = _hull(x, y)
+    hull = Interval(np.minimum(x.low, y.low), np.maximum(x.high, y.high))
     low = np.where(first, x.low, np.where(second, y.low, hull.low))
     return Interval(low, np.where(first, x.high, np.where(second, y.high, hull.high)))
 

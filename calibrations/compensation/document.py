@@ -107,7 +107,11 @@ def _wrap(text: str) -> list[str]:
 
 def _program_lines(compensation: Compensation, origin: Origin) -> Iterator[str]:
     model = compensation.model
-    inputs = _input_text(compensation)
+    inputs = {
+        "g": "specific force",
+        "field": "the magnetic field",
+        "deg/s": "angular rate",
+    }[compensation.unit]
     yield f"{origin.name}: from outputs to {inputs} along the reference axes, by the model {model.name}."
     yield f"  in {UNIT_TEXT[compensation.unit]}"
     yield f"  model file  {origin.model_file}, SHA-256 {origin.sha256}"
@@ -115,14 +119,6 @@ def _program_lines(compensation: Compensation, origin: Origin) -> Iterator[str]:
         if key in model.provenance:
             yield f"  {title}  {as_written(model.provenance[key])}"
     yield f"  written by {origin.program} on {origin.date}"
-
-
-def _input_text(compensation: Compensation) -> str:
-    return {
-        "g": "specific force",
-        "field": "the magnetic field",
-        "deg/s": "angular rate",
-    }[compensation.unit]
 
 
 def _inputs(compensation: Compensation) -> Iterator[str]:

@@ -26,6 +26,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
 from calibrations.criteria import FEWEST_TURNS_OF_A_GYROSCOPE, SMALLEST_TURN_DEG
 from calibrations.errors import DataError, TooFewRows
@@ -205,7 +206,7 @@ def _rows(table: Table, samples: Table, bounds: NDArray[np.intp], before: Array,
     bias, matrix = _rough_calibration(samples, bounds, before, after)
     rates = (np.column_stack([samples.column(name) for name in RATES]) - bias) @ matrix.T
     steps = _pad([np.radians(rates[a + 1 : b - 1]) * durations[a + 1 : b - 1, None] for a, b in bounds])
-    axis = unit_vectors(-_rotation_vectors(_products(_rotations(-steps))))
+    axis = unit_vectors(-Rotation.from_matrix(_products(_rotations(-steps))).as_rotvec())
 
     def means(values: Array) -> Array:
         weighted = (np.average(values[a + 1 : b - 1], axis=0, weights=durations[a + 1 : b - 1]) for a, b in bounds)
@@ -325,25 +326,5 @@ def _frames_to_end(steps: Array) -> Array:
 
 
 def _rotations(vectors: Array) -> Array:
-    """Rotations by vectors (..., 3), rad, as matrices (..., 3, 3): 1 + p [v] + q [v]^2, where [v] u = v x u."""
-    angle = np.sqrt(np.sum(vectors * vectors, axis=-1))
-    p, q = np.sinc(angle / np.pi), 0.5 * np.sinc(angle / 2 / np.pi) ** 2
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    px, py, pz, qx, qy, qz = p * x, p * y, p * z, q * x, q * y, q * z
-    rows = (
-        (1 - qy * y - qz * z, qx * y - pz, qx * z + py),
-        (qx * y + pz, 1 - qx * x - qz * z, qy * z - px),
-        (qx * z - py, qy * z + px, 1 - qx * x - qy * y),
-    )
-    matrices = np.empty((*vectors.shape, 3))
-    for i, row in enumerate(rows):
-        for j, element in enumerate(row):
-            matrices[..., i, j] = element
-    return matrices
-
-
-def _rotation_vectors(matrices: Array) -> Array:
-    """The vectors of rotations (n, 3, 3), rad, shape (n, 3)."""
-    from scipy.spatial.transform import Rotation  # slow to import
-
-    return np.asarray(Rotation.from_matrix(matrices).as_rotvec())
+    """Rotations by vectors (..., 3), rad, as matrices (..., 3, 3)."""
+    return np.asarray(Rotation.from_rotvec(vectors.reshape(-1, 3)).as_matrix().reshape(*vectors.shape, 3))

@@ -105,7 +105,7 @@ class DigitalTwin(Twin):
 
     def advance(self, now_s: float) -> None:
         """Take all samples that are due by `now_s`, and send them."""
-        self._sample(now_s, self._listeners(now_s))
+        self._sample(now_s, [c for c in self._port.connections.values() if not c.is_behind(now_s)])
 
     def _sample(self, now_s: float, listeners: Sequence[Connection]) -> None:
         """Take all samples that are due by `now_s`, and send them to `listeners`."""
@@ -144,10 +144,6 @@ class DigitalTwin(Twin):
     def _sensor_s(self, ticks: NDArray[np.int64]) -> Floats:
         """The times of samples by the sensor's clock, s."""
         return np.asarray(self._zero_s + self._clock.period_s * ticks)
-
-    def _listeners(self, now_s: float) -> list[Connection]:
-        """Connections that have read all bytes sent so far."""
-        return [c for c in self._port.connections.values() if not c.is_behind(now_s)]
 
     def _send(self, values: Floats, ticks: NDArray[np.int64], at_s: Floats, listeners: Sequence[Connection]) -> None:
         """Send samples: together, or one by one while there are faults."""
@@ -218,16 +214,11 @@ class FramedTwin(DigitalTwin):
         return message[:-1] + bytes([message[-1] ^ 0x55]) if is_corrupted else message
 
 
-def sending_port(listen: str) -> Port:
-    """A port for a sensor that sends without requests. The system buffers only a little unread data."""
-    return Port(listen, capacity=HELD)
-
-
 def serve_sensors(
     sensor: Callable[[World, S, Port], DigitalTwin], world: World, roles: Mapping[str, tuple[int, S]], listen: str
 ) -> Server:
     """A link with a sensor for each role: role -> (unit id, not used by such a sensor; settings)."""
-    ports = {role: sending_port(listen) for role in roles}
+    ports = {role: Port(listen, capacity=HELD) for role in roles}
     twins = {role: sensor(world, roles[role][1], port) for role, port in ports.items()}
     return Server(list(ports.values()), twins, {role: Address(port.url) for role, port in ports.items()})
 
