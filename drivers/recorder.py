@@ -44,6 +44,11 @@ class Inputs(Generic[Input]):
 
     channels: Mapping[str, Input]
     on_request: Mapping[str, Input]
+    interchannel_s = 0.0  # from one channel of a scan to the next; 0 where all are read at once
+
+    def lag_s(self, channel: str) -> float:
+        """Delay of this channel's samples after the beginning of a scan."""
+        return list(self.channels).index(channel) * self.interchannel_s if self.interchannel_s else 0.0
 
     @property
     def wired(self) -> Mapping[str, Input]:
@@ -65,8 +70,10 @@ class Inputs(Generic[Input]):
         channels = {name_asked: k for name_asked, k in self.wired.items() if name_asked.rpartition(".")[2] in outputs}
         return replace(self, channels=channels, on_request={})
 
-    def require_different_names(self) -> None:
-        """Raises ValueError for a name that is both a channel and on request."""
+    def require_valid_inputs(self) -> None:
+        """Raises ValueError for a name that is both a channel and on request, and for a negative time."""
+        if not self.interchannel_s >= 0:
+            raise ValueError("interchannel_s must be a time of 0 s or more")
         if duplicates := self.channels.keys() & self.on_request.keys():
             raise ValueError(f"{', '.join(sorted(duplicates))} is a channel already; remove it from on_request")
 

@@ -111,9 +111,17 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
             f"The baud rate is probably wrong: write that of the sensor, as {self.usual_line}",
         )
 
+    @property
     @abstractmethod
+    def _expected(self) -> str:
+        """What carries the samples, as the errors name it."""
+
     def _silence(self, timeout_s: float) -> DriverError:
         """The error for a link on which nothing arrives."""
+        return LinkTimeout(
+            f"{self.name}: received no {self._expected} on {self._link.url} within {timeout_s:g} s",
+            "Check power and cable, and that the sensor sends it",
+        )
 
     @abstractmethod
     def _content(self, decoder: Decoding) -> str:
@@ -319,11 +327,3 @@ class DigitalSensor(Recorder[Settings], Generic[Settings, Decoding]):
 
 def _largest(values: NDArray[np.float64]) -> float:
     return float(np.abs(values).max())
-
-
-def no_samples_error(name: str, url: str, timeout_s: float, expected: str) -> LinkTimeout:
-    """The error for a link on which `expected` does not arrive."""
-    return LinkTimeout(
-        f"{name}: received no {expected} on {url} within {timeout_s:g} s",
-        "Check power and cable, and that the sensor sends it",
-    )

@@ -168,8 +168,8 @@ class Level:
 
     def _listen(self, answer: re.Pattern[bytes]) -> tuple[bytes, re.Match[bytes] | None]:
         """The bytes received until the answer is complete or the time is over."""
-        received, deadline = b"", self._clock.now() + TIMEOUT_S
-        while (left_s := deadline - self._clock.now()) > 0 and (next_bytes := self._link.read(left_s)):
+        received = b""
+        for next_bytes in self._link.until(self._clock.now() + TIMEOUT_S):
             received += next_bytes
             if match := answer.search(received):
                 return received, match

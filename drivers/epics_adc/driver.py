@@ -50,11 +50,7 @@ class Settings(Inputs[str], NoDigitalLines):
         require_positive(self, "rate_hz", "timeout_s")
         if not self.channels or not all(self.wired.values()):
             raise ValueError("channels must name records of the IOC, such as {vx: ai1}")
-        self.require_different_names()
-
-    def lag_s(self, channel: str) -> float:  # noqa: ARG002
-        """Delay between channels, s: 0, because all are read at once."""
-        return 0.0
+        self.require_valid_inputs()
 
 
 class AnalogRecords(Recorder[Settings]):

@@ -125,7 +125,7 @@ class LineSensor(DigitalSensor[Settings, LineDecoder]):
     def _advice(self, decoder: LineDecoder, begun_s: float) -> list[Check]:
         """Settings that fit the lines since `begun_s`, after this test; none if no settings fit."""
         assembly = decoder.assembly
-        while (left_s := begun_s + TEST_S - self._clock.now()) > 0 and (data := self._link.read(left_s)):
+        for data in self._link.until(begun_s + TEST_S):
             assembly.take(data)
         proposal = propose_settings(assembly.shown, max(self._clock.now() - begun_s, 1 / self.settings.rate_hz))
         if proposal is None:
@@ -135,11 +135,9 @@ class LineSensor(DigitalSensor[Settings, LineDecoder]):
         text = f"if the sensor is at rest, its lines fit the settings {{columns: {{{columns}}}, {other_settings}}}"
         return [Check("proposal", False, text)]
 
-    def _silence(self, timeout_s: float) -> DriverError:
-        return LinkTimeout(
-            f"{self.name}: received no line on {self._link.url} within {timeout_s:g} s",
-            "Check power and cable, and that the sensor sends by itself",
-        )
+    @property
+    def _expected(self) -> str:
+        return "line"
 
     def _unreadable(self, decoder: LineDecoder) -> DriverError:
         assembly = decoder.assembly

@@ -47,7 +47,7 @@ class Settings(Inputs[int]):
     def __post_init__(self) -> None:
         if not self.channels or not set(self.wired.values()) <= set(range(t7.INPUTS)):
             raise ValueError(f"channels must name analog inputs, 0 to {t7.INPUTS - 1}, and at least one")
-        self.require_different_names()
+        self.require_valid_inputs()
         if not 0 < self.rate_hz * len(self.channels) <= t7.MOST_SAMPLES_PER_S:
             raise ValueError(f"rate_hz must give at most {t7.MOST_SAMPLES_PER_S} samples a second in all")
         if self.range_v not in t7.RANGES_V:
@@ -57,12 +57,6 @@ class Settings(Inputs[int]):
         lines = [*self.interlocks.values(), *([] if self.power_dio is None else [self.power_dio])]
         if not set(lines) <= set(range(t7.LINES)) or len(set(lines)) < len(lines):
             raise ValueError(f"interlocks must be digital lines, 0 to {t7.LINES - 1}, each with one purpose")
-        if not self.interchannel_s >= 0:
-            raise ValueError("interchannel_s must be a time of 0 s or more")
-
-    def lag_s(self, channel: str) -> float:
-        """Delay of this channel's samples after the beginning of a scan."""
-        return list(self.channels).index(channel) * self.interchannel_s
 
 
 class T7(Recorder[Settings]):

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from drivers.digital.frames import FrameDecoder, Frames, Ints, groups
 from drivers.digital.reception import Batch, Floats, Numbers, Reception, TimeBase
-from drivers.digital.sensor import DigitalSensor, no_samples_error
+from drivers.digital.sensor import DigitalSensor
 from drivers.digital.settings import OUTPUTS, MessageSettings
 from drivers.errors import DriverError, LinkTimeout, Refused, SensorFault
 from drivers.instrument import Identity
@@ -176,9 +176,9 @@ class FlightController(DigitalSensor[Settings, SampleDecoder]):
         """
         self._link.discard()
         self._send(mav.HEARTBEAT, type=mav.GROUND_STATION, autopilot=mav.INVALID, status=4, version=3)
-        stream, begun_s, count = Frames(mav.Mavlink()), self._clock.now(), 0
-        while (left_s := begun_s + HEARTBEAT_S - self._clock.now()) > 0:
-            messages = stream.take(self._link.read(left_s))
+        stream, count = Frames(mav.Mavlink()), 0
+        for data in self._link.until(self._clock.now() + HEARTBEAT_S):
+            messages = stream.take(data)
             heads = mav.heads(messages)
             beats = np.flatnonzero((heads.number == mav.HEARTBEAT.number) & messages.known)
             for k, beat in zip(beats, mav.contents(messages, heads, mav.HEARTBEAT, beats), strict=True):
@@ -218,8 +218,8 @@ class FlightController(DigitalSensor[Settings, SampleDecoder]):
 
     def _await_result(self, command: int) -> int | None:
         """The result of a command; None without an answer in time."""
-        stream, begun_s = Frames(mav.Mavlink()), self._clock.now()
-        while (left_s := begun_s + ACK_S - self._clock.now()) > 0 and (data := self._link.read(left_s)):
+        stream = Frames(mav.Mavlink())
+        for data in self._link.until(self._clock.now() + ACK_S):
             messages = stream.take(data)
             heads = mav.heads(messages)
             answers = np.flatnonzero((heads.number == mav.COMMAND_ACK.number) & messages.known)
@@ -242,12 +242,13 @@ class FlightController(DigitalSensor[Settings, SampleDecoder]):
         counts_text = ", ".join(f"{name} {count}" for name, count in sorted(decoder.seen.items()))
         return counts_text + self._warm
 
-    def _silence(self, timeout_s: float) -> DriverError:
-        return no_samples_error(self.name, self._link.url, timeout_s, self.settings.message)
+    @property
+    def _expected(self) -> str:
+        return self.settings.message
 
     def _unreadable(self, decoder: SampleDecoder) -> DriverError:
         if decoder.unread <= self.longest and decoder.good:
-            return no_samples_error(self.name, self._link.url, 2.0, self.settings.message)
+            return self._silence(2.0)
         return self._no_frames(decoder.stream)
 
 

@@ -69,18 +69,12 @@ class Settings(Inputs[int], NoDigitalLines):
         inputs = list(self.wired.values())
         if not self.channels or (min(inputs) < 1 and inputs != [0]):
             raise ValueError("channels must name inputs of the scanner, such as 101; 0 is the only input of a meter")
-        self.require_different_names()
-        if not self.interchannel_s >= 0:
-            raise ValueError("interchannel_s must be a time of 0 s or more")
+        self.require_valid_inputs()
         if (scan_s := len(self.channels) * self.nplc / self.mains_hz) * self.rate_hz > 1:
             raise ValueError(
                 f"rate_hz must be at most {1 / scan_s:.3g}: {len(self.channels)} readings of nplc {self.nplc:g} take "
                 f"{scan_s:g} s; a shorter nplc gives a higher rate and more noise"
             )
-
-    def lag_s(self, channel: str) -> float:
-        """Delay of this channel's measurement after the beginning of a scan."""
-        return list(self.channels).index(channel) * self.interchannel_s
 
     def commands(self, scans: int) -> list[str]:
         """The commands that prepare a record of `scans` scans."""

@@ -45,13 +45,12 @@ class LinkLines:
     def query(self, command: str, timeout_s: float) -> str:
         self._link.discard()  # a late answer to an earlier question
         self.write(command)
-        received, deadline = b"", self._link.clock.now() + timeout_s
-        while b"\n" not in received and len(received) < LONGEST:
-            left_s = deadline - self._link.clock.now()
-            if left_s <= 0 or not (next_bytes := self._link.read(left_s)):
-                raise _timeout_error(self._name, command, self._link.url, timeout_s)
+        received = b""
+        for next_bytes in self._link.until(self._link.clock.now() + timeout_s):
             received += next_bytes
-        return _answer_text(received.partition(b"\n")[0], self._name, command)
+            if b"\n" in received or len(received) >= LONGEST:
+                return _answer_text(received.partition(b"\n")[0], self._name, command)
+        raise _timeout_error(self._name, command, self._link.url, timeout_s)
 
 
 class VisaLines:

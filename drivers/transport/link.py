@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import socket
 import termios
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Literal, Protocol
 
 import serial
@@ -117,6 +117,12 @@ class Link:
         if self._tap:
             self._tap(self.clock.now(), self._names, "heard", data)
         return data
+
+    def until(self, deadline_s: float) -> Iterator[bytes]:
+        """All bytes that arrive by `deadline_s` of the clock. Raises LinkRefused at the end of the connection."""
+        while (left_s := deadline_s - self.clock.now()) > 0:
+            if data := self.read(left_s):
+                yield data
 
     def discard(self, quiet_s: float = 0.0) -> int:
         """Discard bytes until none has arrived for `quiet_s`. Returns their number.

@@ -147,10 +147,8 @@ class Bus:
         return answer
 
     def _receive(self, action: str) -> ModbusPDU:
-        clock = self.link.clock
-        deadline = clock.now() + TIMEOUT_S
         data = b""
-        while (left_s := deadline - clock.now()) > 0 and (next_bytes := self.link.read(left_s)):
+        for next_bytes in self.link.until(self.link.clock.now() + TIMEOUT_S):
             data += next_bytes
             used, answer = self._decode(data, action)
             if answer is not None:

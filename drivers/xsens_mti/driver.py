@@ -16,7 +16,7 @@ import numpy as np
 
 from drivers.digital.frames import Bytes, FrameDecoder, Frames, Ints
 from drivers.digital.reception import Batch, Numbers, TimeBase
-from drivers.digital.sensor import DigitalSensor, no_samples_error
+from drivers.digital.sensor import DigitalSensor
 from drivers.digital.settings import FIELDS, FORCES, OUTPUTS, RATES, MessageSettings
 from drivers.errors import BadFrame, DriverError, LinkTimeout, Refused, StreamError
 from drivers.instrument import Identity
@@ -166,19 +166,21 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
         if self._warmth.awaited:
             return
         self._warmth.awaited = True
-        decoder, deadline_s = self._decoder(), self._clock.now() + WARM_S
-        while self._warmth.last_c is None and (left_s := deadline_s - self._clock.now()) > 0:
-            if data := self._link.read(left_s):
-                self._warmth.take(decoder.take(data).warm_c, self._clock.now())
+        decoder = self._decoder()
+        for data in self._link.until(self._clock.now() + WARM_S):
+            self._warmth.take(decoder.take(data).warm_c, self._clock.now())
+            if self._warmth.last_c is not None:
+                break
         self._link.discard()
 
     def _is_sending(self) -> bool:
         """Whether the outputs already come at the rate of the settings."""
         decoder, rate_hz, times = self._decoder(), self.settings.rate_hz, np.empty(0)
-        deadline_s = self._clock.now() + 3 / rate_hz + PROBE_S
-        while len(times) < 2 and (left_s := deadline_s - self._clock.now()) > 0 and (data := self._link.read(left_s)):
+        for data in self._link.until(self._clock.now() + 3 / rate_hz + PROBE_S):
             batch = decoder.take(data)
             times = np.concatenate([times, np.empty(0) if batch.time is None else batch.time])
+            if len(times) > 1:
+                break
         steps = self.base.steps(times) * TICK_S * rate_hz
         return bool(len(steps) and (np.abs(steps - 1) < SAME).all())
 
@@ -207,8 +209,7 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
         for _ in range(ATTEMPTS):
             self._link.discard()
             self._link.write(xbus.message(number, data))
-            begun_s = self._clock.now()
-            while (left_s := begun_s + ANSWER_S - self._clock.now()) > 0 and (received := self._link.read(left_s)):
+            for received in self._link.until(self._clock.now() + ANSWER_S):
                 for kind, answer in xbus.messages(stream.take(received)):
                     if kind == xbus.ERROR:
                         raise self._refusal(number, answer)
@@ -233,9 +234,9 @@ class Tracker(DigitalSensor[Settings, SampleDecoder]):
         names = ", ".join(name for kind, name in NAMES.items() if kind in decoder.kinds)
         return f"{decoder.good} messages with {names}{self._warm}"
 
-    def _silence(self, timeout_s: float) -> DriverError:
-        outputs = ", ".join(NAMES[kind] for kind in self.settings.packets if kind in NAMES)
-        return no_samples_error(self.name, self._link.url, timeout_s, f"MTData2 with {outputs}")
+    @property
+    def _expected(self) -> str:
+        return f"MTData2 with {', '.join(NAMES[kind] for kind in self.settings.packets if kind in NAMES)}"
 
     def _unreadable(self, decoder: SampleDecoder) -> DriverError:
         return self._no_frames(decoder.stream) if decoder.unread else self._silence(2.0)
