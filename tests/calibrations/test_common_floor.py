@@ -9,7 +9,7 @@ import pytest
 
 from calibrations.discovery.results import Discovery
 from calibrations.effects.catalogue import catalogue
-from calibrations.loop import add, diagnose, discover
+from calibrations.loop import dataset, diagnose, discover
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
@@ -61,7 +61,7 @@ def test_a_magnet_is_found_though_no_column_tells_the_noise() -> None:
     assert said.verdict == "effect-missing"
     assert said.held_out_before == pytest.approx(found.steps[0].held_out_before, rel=0.05)
     assert said.candidates[0].held_out_after < 0.2 * said.held_out_before
-    falls(add(catalogue()["hard-iron"], read_model("field"), magnetometer()))
+    falls(dataset(magnetometer()).add(catalogue()["hard-iron"], read_model("field"), catalogue()))
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import pytest
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.determined import explain_undetermined, leverages, unseen_variance
 from calibrations.fitting.fit import fit
-from calibrations.loop import add, diagnose, discover
+from calibrations.loop import dataset, diagnose, discover
 from calibrations.model import Model
 from calibrations.model.file import read_model
 from calibrations.presentation.report.report import summary
@@ -85,7 +85,7 @@ def test_a_discovery_on_ten_positions_says_so_too() -> None:
 
 
 def test_adding_an_effect_on_ten_positions_says_so_too() -> None:
-    found = add(catalogue()["axis-nonorthogonality"], read_model("linear"), suarez())
+    found = dataset(suarez()).add(catalogue()["axis-nonorthogonality"], read_model("linear"), catalogue())
     assert found.end.pooled_excess < 0.1
     assert found.verdict == "ambiguous"
     assert "the 9 parameters are not identifiable from 10 positions" in str(found.caution)

@@ -15,7 +15,7 @@ from calibrations.discovery.row_search import _is_explained
 from calibrations.discovery.search import find_path, first_order_cost
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import fit
-from calibrations.loop import add, diagnose, discover
+from calibrations.loop import dataset, diagnose, discover
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations.synthetic import NOISE_V, components, poses, turns
@@ -145,8 +145,8 @@ def test_what_no_effect_describes_is_unexplained(step_deg: float) -> None:
 def test_the_effect_that_a_person_chooses_is_added_whatever_it_is_worth() -> None:
     x, y, z = components(turns())
     table = poses(turns(), 2.5 + x + 0.002 * z**2, 2.5 + y + 0.002 * z**2)
-    right = add(catalogue()["z-axis-bias"], LINEAR, table)
-    wrong = add(catalogue()["cubic-nonlinearity"], LINEAR, table)
+    right = dataset(table).add(catalogue()["z-axis-bias"], LINEAR, catalogue())
+    wrong = dataset(table).add(catalogue()["cubic-nonlinearity"], LINEAR, catalogue())
     assert (right.verdict, right.causes) == ("adequate", ("z-axis-bias",))
     assert right.steps[0].held_out_after < 1.15 < right.steps[0].held_out_before
     assert wrong.verdict == "unexplained"

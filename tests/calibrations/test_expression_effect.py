@@ -12,7 +12,7 @@ from calibrations.effects.catalogue import catalogue
 from calibrations.effects.expression_effect import effect_for, own_effect
 from calibrations.errors import ExpressionError, ModelError
 from calibrations.fitting.fit import Fit, fit
-from calibrations.loop import add, compare, diagnose
+from calibrations.loop import compare, dataset, diagnose
 from calibrations.model.file import dump_model, parse_model, read_model
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic
@@ -139,8 +139,9 @@ def test_what_is_no_number_is_told_with_its_row() -> None:
     ["a*exp(exp(exp(beta)))", "a*exp(exp(exp(exp(b*sin(beta)))))", "a*sin(beta*1e300*b)", "a*1e150*sin(beta)"],
 )
 def test_values_that_no_fit_resolves_are_refused(text: str) -> None:
+    data = table(0.004 * X**2)
     with pytest.raises(ModelError, match=r"own: the parameter [ab] changes the output by more than a fit can resolve"):
-        add(effect_for("own", text, data := table(0.004 * X**2)), read_model("linear"), data)
+        dataset(data).add(effect_for("own", text, data), read_model("linear"), catalogue())
 
 
 def test_the_same_text_is_the_same_effect() -> None:

@@ -15,7 +15,7 @@ from calibrations.documents import comparison_document, diagnosis_document, disc
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import UnusableData
 from calibrations.fitting.fit import fit
-from calibrations.loop import add, compare, dataset, diagnose, discover
+from calibrations.loop import compare, dataset, diagnose, discover
 from calibrations.model.file import read_model
 from calibrations.presentation.certificate.results import figures
 from calibrations.table import Array, Table
@@ -198,7 +198,7 @@ def test_every_command_gives_the_same_verdict(spoil: Callable[[Data], Data]) -> 
         comparison_document(compare(table, model), "linear"),
         diagnosis_document(diagnose(table, model), "linear"),
         discovery_document(discover(table, model), None),
-        discovery_document(add(effect, model, table), None),
+        discovery_document(dataset(table).add(effect, model, catalogue()), None),
     )
     for document in documents:
         assert (document["verdict"], document["residual_structure"]) == (expected.verdict, expected.text)

@@ -11,7 +11,7 @@ import pytest
 from calibrations.discovery.results import Discovery
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, ModelError
-from calibrations.loop import add, compare, dataset, diagnose, discover
+from calibrations.loop import compare, dataset, diagnose, discover
 from calibrations.model.file import dump_model, parse_model, read_model
 from calibrations.noise.fit import NoiseFit
 from calibrations.noise.record import Samples, Still, reduce_record
@@ -125,14 +125,14 @@ def test_a_calibrated_model_fits_its_record_and_another_one_of_the_sensor(tmp_pa
 
 def test_a_model_with_a_line_misses_the_curve() -> None:
     still = ramp(line=5e-4, bow=4e-3)
-    straight = add(catalogue()[BIAS], read_model("still"), still).model
+    straight = dataset(still).add(catalogue()[BIAS], read_model("still"), catalogue()).model
     result = discover(still, straight)
     assert (result.verdict, [step.name for step in result.steps]) == ("adequate", [CURVE])
     assert result.end.pooled_excess < 1.15
 
 
 def test_an_effect_of_temperature_is_added_to_a_noise_model() -> None:
-    added = add(catalogue()[BIAS], read_model("still"), ramp(line=5e-4))
+    added = dataset(ramp(line=5e-4)).add(catalogue()[BIAS], read_model("still"), catalogue())
     assert added.model.params[f"{BIAS}.x"].value == pytest.approx(5e-4, rel=0.02)
     assert added.end.pooled_excess < 1.15
 
@@ -144,7 +144,7 @@ def test_a_record_without_temperature_has_no_effect_of_it() -> None:
     with pytest.raises(DataError, match="temperature_c"):
         compare(bare, model)
     with pytest.raises(ModelError, match="temperature"):
-        add(catalogue()[BIAS], read_model("still"), bare)
+        dataset(bare).add(catalogue()[BIAS], read_model("still"), catalogue())
 
 
 def test_each_channel_has_its_own_slope() -> None:

@@ -10,7 +10,7 @@ import pytest
 from calibrations.effects import Effect, Parameter
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, ModelError, TooFewRows
-from calibrations.loop import add, compare, diagnose, discover
+from calibrations.loop import compare, dataset, diagnose, discover
 from calibrations.model import Model
 from calibrations.model.file import dump_model, parse_model, read_model
 from calibrations.noise.comparison import FREQUENCY, TIME, compare_deviations, deviation
@@ -185,10 +185,10 @@ def test_the_mismatch_of_a_complete_model_is_that_of_chance() -> None:
 def test_adding_what_is_not_enough_says_so() -> None:
     random = np.random.default_rng(7)
     record = still(x=white(random) + 0.5 * traps(random) + 0.4 * noises.sinusoid(SAMPLES, 0.05))
-    found = add(catalogue()["flicker-noise"], model(), record)
+    found = dataset(record).add(catalogue()["flicker-noise"], model(), catalogue())
     assert found.verdict == "unexplained"
     assert "sinusoidal-noise" in str(found.residual_structure)
-    whole = add(catalogue()["sinusoidal-noise"], found.end.model, record)
+    whole = dataset(record).add(catalogue()["sinusoidal-noise"], found.end.model, catalogue())
     assert (whole.verdict, whole.residual_structure) == ("adequate", None)
 
 

@@ -10,7 +10,7 @@ from calibrations.discovery.results import Diagnosis, Discovery
 from calibrations.discovery.verdict import Residual
 from calibrations.documents import diagnosis_document, discovery_document
 from calibrations.effects.catalogue import catalogue
-from calibrations.loop import add, diagnose, discover
+from calibrations.loop import dataset, diagnose, discover
 from calibrations.model.file import read_model
 from calibrations.noise.record import Samples, Still, reduce_record
 from calibrations.table import Array
@@ -91,7 +91,7 @@ def test_a_slow_process_over_white_noise_is_no_filter() -> None:
 
 def test_what_is_added_has_its_doubts_and_an_experiment_too() -> None:
     record = CASES["few periods"](np.random.default_rng(0))
-    found = add(catalogue()["rate-random-walk"], read_model("still"), record)
+    found = dataset(record).add(catalogue()["rate-random-walk"], read_model("still"), catalogue())
     assert (found.verdict, found.alternatives) == ("ambiguous", {"rate-random-walk": ("flicker-noise",)})
     assert "cannot separate rate-random-walk from flicker-noise" in str(found.reason)
     assert found.next_experiment is not None
