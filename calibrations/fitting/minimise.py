@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import scipy  # its room of optimization is loaded where it is first entered
@@ -35,15 +36,12 @@ def minimise(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float
 
     rows = problem.layout.prior_rows
 
-    def residual(theta: Array) -> Array:
-        return np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
-
     def descend(start: Array, stairs: bool) -> scipy.optimize.OptimizeResult:
         def jacobian(theta: Array) -> Array:
             return np.vstack([noise.whiten(problem.jacobian(theta, stairs=stairs)), rows])
 
         return scipy.optimize.least_squares(
-            residual,
+            partial(_white_residual, problem, noise),
             start,
             jac=jacobian,
             bounds=problem.layout.bounds,
@@ -74,7 +72,7 @@ def _at_once(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float
     theta = start + typical * step
     if np.any(theta < low) or np.any(theta > high):
         return None
-    end_residual = np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
+    end_residual = _white_residual(problem, noise, theta)
     if np.linalg.norm(start_residual + J @ step - end_residual) > STRAIGHT * np.linalg.norm(end_residual):
         return None
     sizes = np.linalg.norm(J, axis=0)
@@ -86,20 +84,21 @@ def _at_once(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float
     return theta, float(end_residual @ end_residual) / 2
 
 
+def _white_residual(problem: Problem, noise: Noise, theta: Array) -> Array:
+    """The residual made white, and the priors of the parameters below it, shape (rows,)."""
+    return np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], problem.layout.prior_rows @ theta)
+
+
 def _minimise_determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float]:
     """Minimise by the shortest Gauss-Newton steps, damped where they fail (Levenberg and Marquardt).
 
     What the data do not determine stays as it began.
     """
-    rows = problem.layout.prior_rows
-
-    def white(theta: Array) -> Array:
-        return np.append(noise.whiten(problem.residual(theta)[:, :, None])[:, 0], rows @ theta)
-
+    white = partial(_white_residual, problem, noise)
     theta, residual = start, white(start)
     stairs = False
     for _ in range(NEWTON_STEPS):
-        slope = np.vstack([noise.whiten(problem.jacobian(theta, stairs=stairs)), rows])
+        slope = np.vstack([noise.whiten(problem.jacobian(theta, stairs=stairs)), problem.layout.prior_rows])
         candidate, least = newton_step(problem.layout, white, theta, residual, slope)
         gain = float(residual @ residual - least @ least)
         theta, residual = candidate, least
