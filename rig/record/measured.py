@@ -132,7 +132,7 @@ class MeasuredRun:
         """
         run_id, slash, sensor = name.partition("/")
         run = record.run(run_id)
-        sensor_names = sensors_of(run)
+        sensor_names = run.batch
         if sensor_names and not slash and not run.run.startswith(run_id):
             last = [
                 member for pattern, member in run.sensors.items() if member and f" {run_id}".endswith(f" {pattern}")
@@ -222,11 +222,6 @@ class MeasuredRun:
 def table_of(record: Record, name: str) -> Table:
     """The table of a measured or imported run, see `MeasuredRun`."""
     return MeasuredRun.named(record, name).table()
-
-
-def sensors_of(run: Run) -> list[str]:
-    """The sensors of the batch, in order; empty without a batch."""
-    return list(run.bench.get("sensors", {}))
 
 
 def of_sensor(recorded: KeptPose, sensor: str | None) -> KeptPose:

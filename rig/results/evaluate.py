@@ -11,7 +11,7 @@ from calibrations.text import join_words
 from rig.bench import Bench
 from rig.errors import RecordError
 from rig.record import Record, Run
-from rig.record.measured import MeasuredRun, sensors_of
+from rig.record.measured import MeasuredRun
 from rig.results.result import EVALUATIONS, Evaluation, Missing, Result, documents
 
 MODULES = {  # with the evaluation of each procedure, imported when it is needed
@@ -55,7 +55,7 @@ def evaluate_results(record: Record, run: Run) -> dict[str, Result | Missing]:
     if run.procedure not in MODULES:
         return {}
     evaluation = _evaluation(run.procedure)
-    sensors = [] if evaluation.of_bench else sensors_of(run)
+    sensors = () if evaluation.of_bench else run.batch
     if not sensors:
         return dict(evaluation.evaluate(MeasuredRun(record, run)))
     by_sensor = {sensor: evaluation.evaluate(MeasuredRun(record, run, sensor)) for sensor in sensors}

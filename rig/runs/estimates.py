@@ -29,7 +29,7 @@ from procedures.session import Dwell, Pose
 from procedures.tumbles import tumble
 from rig.planning.plan import turn_words
 from rig.record import KeptPose, Record
-from rig.record.measured import FIELD, RATE, MeasuredRun, of_sensor, sensor_from_table, sensors_of, specific_force_g
+from rig.record.measured import FIELD, RATE, MeasuredRun, of_sensor, sensor_from_table, specific_force_g
 from rig.record.tables import units_of
 from rig.results.soak import table_of
 
@@ -229,9 +229,7 @@ class SoakForecaster:
         """The run begins or continues: take the poses in the record."""
         with Record() as record:
             run_row = record.run(run)
-            sensors = [MeasuredRun(record, run_row, name) for name in sensors_of(run_row)] or [
-                MeasuredRun(record, run_row)
-            ]
+            sensors = [MeasuredRun(record, run_row, name) for name in run_row.batch] or [MeasuredRun(record, run_row)]
             self.followers = [Follower.of(sensor) for sensor in sensors]
         self.run, self.on_s = run, None
         self.unit = str(run_row.constants.get("unit", "V"))

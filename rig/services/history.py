@@ -30,14 +30,13 @@ from rig.bench import read_bench
 from rig.bench.certificates import EXPIRED
 from rig.errors import RecordError, RigError
 from rig.record import Record, Run
-from rig.record.measured import MeasuredRun, sensors_of
+from rig.record.measured import MeasuredRun
 
 
 def members(run: Run) -> dict[str, str]:
     """Serial number (or name) -> the sensor's name in the run's batch, "" with one sensor."""
-    if batch := sensors_of(run):
-        sensors_by_member: dict[str, Mapping[str, str]] = {member: run.bench["sensors"][member] for member in batch}
-        return {sensor.get("serial") or sensor["name"]: member for member, sensor in sensors_by_member.items()}
+    if batch := run.bench.get("sensors"):
+        return {sensor.get("serial") or sensor["name"]: member for member, sensor in batch.items()}
     name = run.constants.get("serial") or run.constants.get("sensor")
     return {as_written(name): ""} if name else {}
 
@@ -62,9 +61,6 @@ def lives(run: Run, runs: Iterable[Run]) -> dict[str, int]:
     runs_by_sensor = calibrating(runs)
     counts = {sensor: len(runs_by_sensor.get(sensor, ())) for sensor in members(run)}
     return {sensor: count for sensor, count in counts.items() if count > 1}
-
-
-# A sensor's calibrations over its life: each complete run of it that determines a model, in the order of time.
 
 
 STALE_DAYS = 365.0  # without a limit that decides when a calibration is due

@@ -18,7 +18,7 @@ from rig.cli.terminal.progress import working
 from rig.errors import RecordError
 from rig.record import Event, KeptPose, Line, Record, Run
 from rig.record.codec import digest_of
-from rig.record.measured import MeasuredRun, sensors_of
+from rig.record.measured import MeasuredRun
 from rig.record.tables import units_of
 from rig.services.next_steps import next_steps, results_table
 
@@ -69,8 +69,7 @@ def show_command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
 def _ranges(record: Record, run: Run) -> Ranges:
     """Minimum and maximum of each column; empty while the poses make no table."""
     ranges: dict[str, tuple[float, float]] = {}
-    sensors: list[str | None] = [*sensors_of(run)]
-    for sensor in sensors or [None]:
+    for sensor in run.batch or (None,):
         try:
             table = MeasuredRun(record, run, sensor).table()
         except (RecordError, CalibrationError):
