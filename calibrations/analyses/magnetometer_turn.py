@@ -91,7 +91,7 @@ def correct_by_extremes(outputs: Array) -> Array:
 # Full turns of a magnetometer, each with one axis vertical: the evaluation by hand, and the elements of the field.
 #
 # The calibrated outputs, turned back by the angles of the stages and the mount, are the field in the frame of the rig:
-# x along its base, z upward. Its elements are those below with X = x, Y = -y, Z = -z. D is then not the
+# x along its base, z upward. Its elements have north = x, east = -y and down = -z. D is then not the
 # declination, but the azimuth from the x axis of the base, clockwise from above; the bench file has the heading of
 # that axis.
 #
@@ -190,52 +190,30 @@ def _hidden_iron_std(outputs: Array, upright: int, round_z: Ellipse) -> float:
     return float(HIDDEN_IRON * round_z.flattening * abs(outputs[:, upright].mean()))
 
 
-def horizontal_per_mille(xy: Array) -> float:
-    """The variation of the magnitude of a horizontal field (n, 2)."""
-    size = np.linalg.norm(xy, axis=1)
+def magnitude_per_mille(field: Array) -> float:
+    """The variation of the magnitude of a field (n, components), per mille."""
+    size = np.linalg.norm(field, axis=1)
     return float(1e3 * size.std() / size.mean())
 
 
 def _remaining_per_mille(outputs: Array, middle: Array, round_z: Ellipse, about_z: Array) -> float:
     """Remaining variation, per mille: of the whole sphere if all hard iron is known, otherwise of the turn about z."""
     if not np.isfinite(middle).all():
-        return horizontal_per_mille((about_z - estimate_hard_iron(about_z)) @ round_z.correction)
+        return magnitude_per_mille((about_z - estimate_hard_iron(about_z)) @ round_z.correction)
     centred = outputs - middle
-    size = np.linalg.norm(np.column_stack([centred[:, :2] @ round_z.correction, centred[:, 2:]]), axis=1)
-    return float(1e3 * size.std() / size.mean())
+    return magnitude_per_mille(np.column_stack([centred[:, :2] @ round_z.correction, centred[:, 2:]]))
 
 
 def _elements(base: Array) -> dict[str, float]:
-    x, y, z = base[0], -base[1], -base[2]
-    elements = {
-        "F": total(x, y, z),
-        "H": horizontal(x, y),
-        "D": declination_deg(x, y),
-        "I": inclination_deg(x, y, z),
+    """The elements of a field (3,) in the frame of the rig: F total, H horizontal, D declination and I dip in deg.
+
+    Book (17.6)-(17.10), with atan2 in place of the arc tangent, which does not know the quadrant.
+    """
+    north, east, down = base[0], -base[1], -base[2]
+    horizontal = np.hypot(north, east)
+    return {
+        "F": float(np.hypot(horizontal, down)),
+        "H": float(horizontal),
+        "D": float(np.degrees(np.arctan2(east, north))),
+        "I": float(np.degrees(np.arctan2(down, horizontal))),
     }
-    return {name: float(value) for name, value in elements.items()}
-
-
-# The elements of the earth's magnetic field: X north, Y east, Z down; F total, H horizontal, D declination, I dip.
-#
-# Source  Book (17.6)-(17.10), with atan2 in place of the arc tangent, which does not know the quadrant.
-
-
-def horizontal(x: Array, y: Array) -> Array:
-    """H, in the unit of the components."""
-    return np.hypot(x, y)
-
-
-def total(x: Array, y: Array, z: Array) -> Array:
-    """F, in the unit of the components. (17.6)"""
-    return np.hypot(horizontal(x, y), z)
-
-
-def declination_deg(x: Array, y: Array) -> Array:
-    """D, deg from north, positive to the east. (17.9)"""
-    return np.degrees(np.arctan2(y, x))
-
-
-def inclination_deg(x: Array, y: Array, z: Array) -> Array:
-    """I, deg from the horizontal, positive downward. (17.10)"""
-    return np.degrees(np.arctan2(z, horizontal(x, y)))

@@ -120,17 +120,10 @@ class AxisEstimate:
         """Output by the manufacturer's method, V. Ang (8)."""
         return a * self.scale + self.bias
 
-    def acceleration(self, v: Array, other_output: Array, a_z: Array) -> Array:
-        """Acceleration, g, from this output and that of the other axis, V. Ang (14), (16)."""
-        return (v - self._bias_at(other_output, a_z)) / np.polyval(self.r, a_z)
-
     def output(self, a: Array, other_output: Array, a_z: Array) -> Array:
-        """Output, V, from the acceleration, g, and the other axis's output: the inverse of Ang (14), (16)."""
-        return a * np.polyval(self.r, a_z) + self._bias_at(other_output, a_z)
-
-    def _bias_at(self, other_output: Array, a_z: Array) -> Array:
-        """Ang (9)."""
-        return np.asarray(self.bias + np.polyval(self.p, other_output) + np.polyval(self.q, a_z))
+        """Output, V, from the acceleration, g, and the other axis's output: the inverse of Ang (14), (16), with (9)."""
+        bias = self.bias + np.polyval(self.p, other_output) + np.polyval(self.q, a_z)
+        return np.asarray(a * np.polyval(self.r, a_z) + bias)
 
 
 def estimate_axis(axis: str, planes: Sequence[Plane], v: Array, other_output: Array, a: Array) -> AxisEstimate:
@@ -191,12 +184,6 @@ class Stepwise:
         for _ in range(60):  # cross-axis slopes are far below 1: the error falls by their product each time
             v_x, v_y = self.x.output(a_x, v_y, a_z), self.y.output(a_y, v_x, a_z)
         return np.column_stack([v_x, v_y])
-
-    @cached_property
-    def acceleration(self) -> Array:
-        """Acceleration from the measured outputs, g, with a_z from the stage angle. Ang (14), (16)."""
-        v_x, v_y, a_z = self.table.output("x"), self.table.output("y"), self.force[:, 2]
-        return np.column_stack([self.x.acceleration(v_x, v_y, a_z), self.y.acceleration(v_y, v_x, a_z)])
 
     @cached_property
     def linear_predicted(self) -> Array:

@@ -19,7 +19,6 @@ from functools import reduce
 from operator import xor
 
 TIME = "time"  # name of the column of the sensor's own time
-FORMATS = ("csv", "named", "teleplot", "nmea")
 PAIR = re.compile(r"([A-Za-z_][\w.]*)\s*[:=]\s*([-+]?[\d.][\d.eE+-]*)")
 MOST_SHOWN = 10_000  # lines that an assembly keeps for a proposal
 Column = int | str

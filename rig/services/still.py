@@ -335,18 +335,11 @@ def _note_upright(recorded: KeptPose, volts: Array, stream: Stream) -> None:
 BLOCK = 1 << 17
 
 
-def stream(record: Record | None, data: str, channel: str | None, rate_hz: float | None) -> Stream:
-    """The samples that `data` names. `rate_hz` is for data without a rate of their own.
-
-    Raises DataError and RecordError: no such file, run or channel; a rate that is missing or disagrees; gaps.
-    """
-    return _source(record, data, rate_hz)(channel)
-
-
 def axes(record: Record | None, data: str, channel: str | None, rate_hz: float | None) -> dict[str, Stream]:
     """The samples of one sensor's axes by name: the requested axis alone, or all axes of the first sensor.
 
-    A channel whose name has no axis in it is called x. Raises what `stream` raises.
+    A channel whose name has no axis in it is called x. `rate_hz` is for data without a rate of their own. Raises
+    DataError and RecordError: no such file, run or channel; a rate that is missing or disagrees; gaps.
     """
     source = _source(record, data, rate_hz)
     first = source(channel)

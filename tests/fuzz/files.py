@@ -25,7 +25,7 @@ from rig.bench import DEFAULT, read_bench
 from rig.errors import RigError
 from rig.record import KeptPose, Record, codec
 from rig.record.recover import recover
-from rig.services.still import stream
+from rig.services.still import axes
 from tests.fuzz.target import Target
 from tests.rig.test_store import begin, block
 
@@ -75,7 +75,8 @@ def error_table(data: bytes) -> object:
 
 
 def array(data: bytes) -> object:
-    return [len(block) for block in stream(None, str(file("still.npy", data)), None, 1000.0).blocks]
+    (still,) = axes(None, str(file("still.npy", data)), None, 1000.0).values()
+    return [len(block) for block in still.blocks]
 
 
 def record(data: bytes) -> object:

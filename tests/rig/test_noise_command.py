@@ -16,7 +16,7 @@ from drivers.recorder import Samples
 from procedures.noise_floor import STILL
 from procedures.session import Pose
 from rig.record import KeptPose, Record
-from rig.services.still import coarse, stream
+from rig.services.still import axes, coarse
 from tests import recorded
 from tests.rig.conftest import Ended
 
@@ -181,7 +181,7 @@ def test_a_run_straight_from_its_record(rig: Rig, run: str) -> None:
 
 def test_no_block_of_a_run_is_read_twice(run: str) -> None:
     with Record() as record:
-        still = stream(record, run, "vy", None)
+        (still,) = axes(record, run, "vy", None).values()
         lengths = [len(block) for block in still.blocks]
     assert lengths == [10_000] * 6
     assert {name: sum(map(len, blocks)) for name, blocks in still.logged.items()} == dict.fromkeys(

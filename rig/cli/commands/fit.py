@@ -11,7 +11,12 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from calibrations.analyses.magnetometer_turn import correct_by_extremes, estimate_hard_iron, fit_ellipse
+from calibrations.analyses.magnetometer_turn import (
+    correct_by_extremes,
+    estimate_hard_iron,
+    fit_ellipse,
+    magnitude_per_mille,
+)
 from calibrations.discovery.check_poses import Check, judge_check_poses
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.matrices import CalibrationMatrices, calibration_matrices
@@ -193,8 +198,7 @@ def _hand_document(table: Table) -> dict[str, Any]:
         results["hard_iron"][2] = None  # the mean of z also contains the vertical field
         results["soft_iron"] = {"greatest": ellipse.greatest, "least": ellipse.least, "angle_deg": angle}
         deviations = correct_by_extremes(table.outputs)[:, :2]
-    size = np.linalg.norm(deviations, axis=1)
-    return {"by_hand": results | {"unit": table.unit, "left_per_mille": float(1e3 * size.std() / size.mean())}}
+    return {"by_hand": results | {"unit": table.unit, "left_per_mille": magnitude_per_mille(deviations)}}
 
 
 def _book_text(table: Table) -> str:
