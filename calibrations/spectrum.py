@@ -48,18 +48,21 @@ class Sampling:
 
     @property
     def interval_s(self) -> float:
-        """Between means."""
+        """Time between two means, s."""
         return self.size / self.rate_hz
 
 
 def white(f: Array, _: Sampling) -> Array:
-    """1 at every frequency."""
+    """The spectrum of white noise: 1 at every frequency."""
     return np.ones_like(f)
 
 
 def flicker(f: Array, by: Sampling, corner_hz: float = np.inf) -> Array:
-    """Fractionally differenced noise of order 1/2 (Kasdin, Proc. IEEE 83, 1995), which is 1 / (2 pi f) but near the
-    sampling frequency; behind a first-order low-pass where it has a corner; folded."""
+    """The folded spectrum of 1/f noise, behind a first-order low-pass if it has a corner.
+
+    It is that of fractionally differenced noise of order 1/2 (Kasdin, Proc. IEEE 83, 1995): 1 / (2 pi f), except near
+    the sampling frequency.
+    """
     folds = min(FOLDS, by.size // 2)
     step, total = 1 / by.rate_hz, np.zeros_like(f)
     for fold in range(-folds, folds + 1 - (by.size % 2 == 0 and folds < FOLDS)):
@@ -75,7 +78,10 @@ def _power_gain(f: Array, sine: Array, by: Sampling) -> Array:
 
 
 def random_walk(f: Array, by: Sampling) -> Array:
-    """Of steps at each sample: what means differ by has covariances at lags 0 and 1 only."""
+    """The spectrum of a random walk with a step at each sample.
+
+    The difference of two successive means has a covariance with itself and with its neighbours only.
+    """
     s = by.size
     phase = 2 * np.pi * f * by.interval_s
     increments = (2 * s**2 + 1) / (3 * s) + np.cos(phase) * (s**2 - 1) / (3 * s)
@@ -83,12 +89,12 @@ def random_walk(f: Array, by: Sampling) -> Array:
 
 
 def quantisation(f: Array, by: Sampling) -> Array:
-    """Of the values' sum, rounded at each sample; of a mean only the ends count."""
+    """The spectrum of the rounding of the values' sum. In a mean only the errors of its first and last sum remain."""
     return np.asarray(4 * np.sin(np.pi * f * by.interval_s) ** 2 / by.interval_s)
 
 
 def gauss_markov(f: Array, by: Sampling, time_constant_s: float) -> Array:
-    """First-order, of unit variance."""
+    """The spectrum of a first-order Gauss-Markov process of unit variance."""
     a, s = 1 / (by.rate_hz * time_constant_s), by.size
     phi, step = np.exp(-a), -np.expm1(-a)
     decay = -np.expm1(-a * s)
@@ -174,7 +180,7 @@ def flickering(number: Array) -> Array:
 
 
 def slow_bands(means: Array, sampling: Sampling, corner_hz: float = np.inf) -> Bands:
-    """Of a record's means, shape (n,), up to half the corner of the output's filter."""
+    """The bands of a record's means (n,), up to half the corner of the output's filter."""
     n = len(means)
     highest = min(n, 2 + int(corner_hz * n * sampling.interval_s) if np.isfinite(corner_hz) else n)
     power = scipy.fft.dct(means, type=2, norm="ortho")[1:highest] ** 2 * sampling.interval_s
@@ -192,7 +198,7 @@ def _slow_grid(n: int, highest: int, sampling: Sampling, corner_hz: float) -> Ba
 
 
 def fast_bands(frequency_hz: Array, density: Array, freedom: float, rate_hz: float, corner_hz: float) -> Bands:
-    """From ordinates (f,) with their degrees of freedom, up to half the corner of the output's filter.
+    """The bands of ordinates (f,) with their degrees of freedom, up to half the corner of the output's filter.
 
     Under a Hann window neighbours have a correlation of 4/9, and their neighbours 1/36.
     """
@@ -210,7 +216,7 @@ def fast_bands(frequency_hz: Array, density: Array, freedom: float, rate_hz: flo
 
 @lru_cache(maxsize=8)
 def _edges(n: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """Where bands of n ordinates begin, and n."""
+    """The first ordinate of each band of n ordinates, and n."""
     edges = [*range(min(n, SINGLE) + 1)]
     while edges[-1] < n:
         edges.append(min(n, max(edges[-1] + 1, int(edges[-1] * RATIO))))
@@ -233,22 +239,22 @@ class Segments:
 
     @property
     def frequency_hz(self) -> Array:
-        """Of the ordinates."""
+        """The frequencies of the ordinates."""
         return np.arange(1, LENGTH // 2) * self.rate_hz / LENGTH
 
     @property
     def density(self) -> Array:
-        """Two-sided, over all parts, unit^2/Hz."""
+        """The two-sided density over all parts, unit^2/Hz."""
         scale = self.rate_hz * np.sum(WINDOW**2) * max(int(self.stretches.sum()), 1)
         return np.asarray(self.power.sum(axis=0) / scale)
 
     @property
     def freedom(self) -> float:
-        """Degrees of freedom to each ordinate."""
+        """Degrees of freedom of each ordinate."""
         return 2 * max(int(self.stretches.sum()), 1) / ALIKE
 
     def part(self, first: int, end: int) -> Segments:
-        """Some of the parts."""
+        """The segments of the parts from `first` to `end`."""
         return Segments(self.power[first:end], self.stretches[first:end], self.rate_hz)
 
 
@@ -275,7 +281,7 @@ class Welch:
         self._remainder = waiting[len(starts) * LENGTH // 2 :]
 
     def segments(self) -> Segments:
-        """By time."""
+        """The segments of the samples so far, in order of time."""
         count = self._part + 1
         return Segments(self._power[:count].copy(), self._stretches[:count].copy(), self._rate_hz)
 
@@ -319,7 +325,7 @@ class Means:
         self._remainder = waiting
 
     def values(self) -> Array:
-        """The means less their mean, shape (n,)."""
+        """The means without their own mean, shape (n,)."""
         means = self._sums[: self._filled] / self.size
         return means - means.mean() if len(means) else means
 

@@ -99,7 +99,7 @@ def _exceedance(noncentrality: float, threshold: float) -> float:
 
 
 def vary_one_way(right: Fit, wrong: Fit, table: Table) -> ExpectedResult:
-    """As `expected_gain`, where `right` is: the noise is that of `right`."""
+    """The expected result if `right` is the true model: the noise is that of `right`."""
     least = _distance(right, wrong, table)
     return ExpectedResult(least(False), least(True))
 

@@ -109,7 +109,7 @@ def _class_effect(cls: type[Effect]) -> Effect:
 
 
 def _file(cls: type[Effect], method: str) -> str:
-    """Where the method of a class was written; of a notebook, its cell."""
+    """The file in which the method of a class was written, or the cell of a notebook."""
     return str(getattr(cls, method).__code__.co_filename)
 
 

@@ -118,7 +118,7 @@ def sensor_temperature_c(table: Table, lead_s: float, of_level: bool = False) ->
 
 
 def temperature_rate_c_s(table: Table) -> Array:
-    """How fast the thermometer's reading changes, C/s, shape (n,): as logged, else from the reading; rows in order."""
+    """Rate of change of the thermometer's reading, C/s, shape (n,): as logged, else from the reading; rows in order."""
     if RATE in table:
         return table.column(RATE)
     return _rate(leading_temperature(table, 0.0), table.time_s)
@@ -126,7 +126,7 @@ def temperature_rate_c_s(table: Table) -> Array:
 
 @lru_cache(maxsize=64)
 def leading_temperature(table: Table, lead_s: float) -> Array:
-    """As `sensor_temperature_c`, from readings without their scatter; as logged if no time changes."""
+    """`sensor_temperature_c` from readings without their scatter; the logged temperature if no time changes."""
     logged = table.column("temperature_c")
     if not has_times(table):
         return logged

@@ -58,7 +58,7 @@ def least_squares(matrix: Array, measured: Array, variances: Array | float = 1.0
 
 
 def shortest_solution(matrix: Array, measured: Array, variances: Array) -> Estimate:
-    """As above for columns that may depend on each other: the solution of least length."""
+    """`least_squares` for columns that may depend on each other: the solution of least length."""
     weight = 1 / np.sqrt(variances)
     weighted, values = matrix * weight[:, None], measured * weight
     covariance = np.asarray(np.linalg.pinv(weighted.T @ weighted, rcond=1e-10, hermitian=True))

@@ -90,7 +90,7 @@ class _Spectrum:
 
     @classmethod
     def of(cls, power: Array, level: Array) -> _Spectrum:
-        """By the power that was seen (k,). Where nothing scatters the likelihood is flat, and so is the share."""
+        """The spectrum that fits the observed power (k,). Without scatter the likelihood is flat, so `std` is large."""
         optimum = minimize_scalar(_deviance_of_ratio, bounds=LOG_RATIOS, args=(power, level), method="bounded")
         neighbours = sum(
             _deviance_of_ratio(optimum.x + step, power, level) for step in (-CURVATURE_STEP, CURVATURE_STEP)

@@ -125,7 +125,7 @@ def _ranges(table: Table, channels: int) -> Array:
 
 
 def _derivatives(fit: Fit, effect: Effect) -> Iterator[Group]:
-    """Of the residual with respect to the effect's parameters, from each of its starts."""
+    """Derivatives of the residual with respect to the effect's parameters, at each of its starts."""
     problem = make_problem(fit.model.with_effect(effect), fit.table)
     own_columns = problem.layout.of_effect(effect.name)
     scaled = bool(effect.places & {"pose", "force"})

@@ -108,7 +108,7 @@ class Siblings:
         return self._quantile((1 - coverage) / 2), self._quantile((1 + coverage) / 2)
 
     def _quantile(self, share: float) -> Array:
-        """Of the mixture over tau, by halving."""
+        """The quantile of every theta in its mixture over tau, by bisection."""
         mean, std = self._estimate_each
         low, high = np.min(mean - 12 * std, axis=0), np.max(mean + 12 * std, axis=0)
         for _ in range(HALVINGS):

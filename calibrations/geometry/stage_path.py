@@ -58,7 +58,7 @@ def sensed_turning_points(table: Table, a: Array) -> Array:
 
 
 def _changed_path(table: Table, change: Array) -> Array:
-    """As `sensed_turning_points`, by the change of the force at the poses, (n, 3), g."""
+    """`sensed_turning_points` for a `change` of the force at the poses, (n, 3), g."""
     if not change.any():
         return turning_points(table)
     at_poses, solving, at_turns = _products_of_angles(table)

@@ -83,7 +83,7 @@ class Turns(Table):
 
     @property
     def duration_s(self) -> Array:
-        """Of each turn, (n,)."""
+        """Duration of each turn, s, (n,)."""
         return np.array([self.samples.column("duration_s")[a + 1 : b - 1].sum() for a, b in self.bounds])
 
     def residual(self, rates_deg_s: Array) -> Array:

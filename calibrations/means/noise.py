@@ -271,7 +271,10 @@ def norm_std(table: Table, std: Array) -> Array:
 
 
 def inflation(table: Table, axis: str = "") -> float:
-    """As measured on the samples of `axis`, else that of the table's filter; 1 where corner or rate is not given."""
+    """Ratio of the variance of a mean to that of independent samples.
+
+    It is that measured on the samples of `axis`, else that of the table's filter; 1 if corner or rate is not given.
+    """
     if (measured := f"noise_inflation_{axis}") in table.constants:
         return table.number(measured, 1.0)
     if "filter_corner_hz" not in table.constants or "sample_rate_hz" not in table.constants:
@@ -313,7 +316,7 @@ def measured_inflation(blocks: Array) -> tuple[Array, Array]:
 
 
 def autocovariance(x: Array, lags: int) -> Array:
-    """Of values (..., n) about their mean, at lags 0 .. lags - 1: sums of products over n, shape (..., lags)."""
+    """Autocovariance of values (..., n), at lags 0 .. lags - 1: sums of products divided by n, shape (..., lags)."""
     n = x.shape[-1]
     size = 1 << (n + lags - 1).bit_length()  # no lag that is used wraps round
     spectrum = np.fft.rfft(x - x.mean(axis=-1, keepdims=True), size)

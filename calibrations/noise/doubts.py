@@ -257,7 +257,7 @@ def possible_corner_hz(search: Search, name: str) -> float | None:
 
 
 def filter_text(name: str, corner: float) -> str:
-    """Both explanations, and two ways to decide without the rig."""
+    """Both explanations of such noise, and two ways to decide between them without the rig."""
     return (
         f"{name} cannot be separated from white noise behind a first-order low-pass of {corner:.3g} Hz "
         f"({OUTPUT_FILTER}): if the output has one, write `# filter_corner_hz: {corner:.3g}` above the table; or "

@@ -136,7 +136,7 @@ def _shape(effect: Effect, fit: ChannelFit) -> Values:
 
 
 def power_covariance(fit: ChannelFit) -> tuple[list[tuple[str, str]], Array]:
-    """Each strength's square and each shape as (effect, parameter), and their covariance (p, p)."""
+    """The squares of strengths and the shapes, named as (effect, parameter), and their covariance (p, p)."""
     columns: dict[tuple[str, str], Array] = {}
     for effect in fit.effects:
         strength, values = effect.parameters[0].name, fit.values[effect.name]

@@ -39,7 +39,7 @@ class Logged:
     mean: float = 0.0
 
     def part(self, span: slice) -> Logged:
-        """Some of the record, which is a record of its own."""
+        """A part of the record, as a record of its own."""
         readings, level = (values[span] - values[span].mean() for values in (self.read, self.level))
         return Logged(readings, level, self.doubt, self.mean + float(self.read[span].mean()))
 

@@ -71,7 +71,7 @@ def stopped_nm(odd: Oddities, x_nm: float) -> float:
 
 @dataclass(frozen=True)
 class Supply:
-    """All slow: a supply's fast ripple is picked up as hum (see noise)."""
+    """The slow changes of the supply voltage. Its fast ripple is picked up as hum (see `pickup`)."""
 
     nominal_v: float = 5.0
     drift_v_per_h: float = 0.0

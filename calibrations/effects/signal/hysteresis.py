@@ -71,7 +71,7 @@ class Hysteresis(Effect):
 
 
 def _limits(p: Values) -> Array:
-    """Of each element along each axis, g, where the other axis is not loaded, shape (elements, 3)."""
+    """The slip limit of each element along each axis, g, if the other axis is not loaded, shape (elements, 3)."""
     reach = np.maximum(p.reach, LEAST_REACH_G)  # an axis that is not measured has none
     return np.asarray(reach * (1 + p.spread * ELEMENTS[:, None]))
 

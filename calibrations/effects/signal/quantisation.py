@@ -58,7 +58,7 @@ class Quantisation(Effect):
     )
 
     def searched(self, table: Table) -> float:
-        """How many steps that look different the start is the best of."""
+        """The number of different steps of which the start is the best."""
         return len(_frequencies(table)) / FINEST
 
     def output(self, v: Array, table: Table, p: Values) -> Array:
