@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 
 from calibrations.analyses.magnetometer_turn import (
     correct_by_extremes,
-    declination_deg,
     estimate_hard_iron,
+    field_elements,
     fit_ellipse,
-    horizontal,
-    inclination_deg,
-    total,
 )
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, ModelError
@@ -172,8 +171,10 @@ def test_components_of_a_field_give_its_elements() -> None:
     d, i = np.radians(4.5), np.radians(67.9)
     x, y, z = 49600.0 * np.array([np.cos(i) * np.cos(d), np.cos(i) * np.sin(d), np.sin(i)])
     assert (float(x), float(y), float(z)) == pytest.approx((18603.0, 1464.1, 45955.0), rel=1e-3)
-    assert total(x, y, z) == pytest.approx(49600.0)
-    assert declination_deg(x, y) == pytest.approx(4.5)
-    assert horizontal(x, y) == pytest.approx(49600.0 * np.cos(np.radians(67.9)))
-    assert inclination_deg(x, y, z) == pytest.approx(67.9)
-    assert declination_deg(np.array(-1.0), np.array(-1.0)) == pytest.approx(-135.0)  # the quadrant that atan loses
+    assert elements(x, y, z) == pytest.approx({"F": 49600.0, "H": 49600.0 * np.cos(i), "D": 4.5, "I": 67.9})
+    assert elements(-1.0, -1.0, 0.0)["D"] == pytest.approx(-135.0)  # the quadrant that atan loses
+
+
+def elements(north: float, east: float, down: float) -> Mapping[str, float]:
+    """F, H, D and I of a sensor whose x points to the north and z upward."""
+    return field_elements(np.array([[north, -east, -down]]), np.eye(3)[None], ["one"]).value
