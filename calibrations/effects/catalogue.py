@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import importlib
 import importlib.util
 import logging
@@ -144,7 +143,6 @@ def _load(path: Path) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     try:
-        _refuse_old_form(path)
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         raise fault(path, error) from error
@@ -158,7 +156,10 @@ def _module_effect(module: ModuleType, path: Path) -> Effect:
     effects = [cls for cls in classes if issubclass(cls, Effect)]
     if [cls.__name__ for cls in effects] != [expected_name]:
         names = ", ".join(cls.__name__ for cls in effects) or "no effect"
-        raise ModelError(f"{path}: must define one effect, `class {expected_name}(Effect):`; it defines {names}")
+        raise ModelError(
+            f"{path}: must define one effect, `class {expected_name}(Effect):`; it defines {names}. "
+            'See "An effect" in CONTRIBUTING.md'
+        )
     effect = effects[0]()
     effect.name = path.stem.replace("_", "-")
     _require_parts(effect, f"{path}: {expected_name}")
@@ -181,29 +182,6 @@ def _require_parts(effect: Effect, label: str) -> None:
 def class_name(path: Path) -> str:
     """The name of the class in an effect's file: `WormError` in worm_error.py."""
     return "".join(part.capitalize() for part in path.stem.split("_"))
-
-
-def _refuse_old_form(path: Path) -> None:
-    """Raise ModelError for a file with PARAMETERS and functions instead of a class."""
-    body = ast.parse(path.read_text(encoding="utf-8")).body
-    names = {
-        target.id
-        for node in body
-        if isinstance(node, ast.Assign)
-        for target in node.targets
-        if isinstance(target, ast.Name)
-    }
-    names |= {node.name for node in body if isinstance(node, ast.FunctionDef) and node.name in HOOKS}
-    if "PARAMETERS" in names or (names & {*HOOKS} and not any(isinstance(node, ast.ClassDef) for node in body)):
-        hook = next((hook for hook in HOOKS if hook in names), "transduction")
-        raise ModelError(
-            "an effect is a class now, not PARAMETERS and functions. Write it so, with the docstring in the class, "
-            'lower-case names for NEEDS, KINDS, AFTER ..., and see "An effect" in CONTRIBUTING.md:\n'
-            f"    from calibrations.effects import Effect, Parameter\n"
-            f"    class {class_name(path)}(Effect):\n"
-            f'        slope = Parameter("{{out}}", typical=0.001)\n'
-            f"        def {hook}(self, ..., table, p):  # p.slope is the value"
-        )
 
 
 def fault(path: Path, error: BaseException, name: str = "") -> ModelError:

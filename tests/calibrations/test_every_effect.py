@@ -205,40 +205,15 @@ def test_an_effect_defined_in_a_notebook_has_its_class_as_name() -> None:
     assert (effect.name, [p.name for p in effect.parameters]) == ("fifth-harmonic", ["sine", "cosine"])
 
 
-OLD = '''"""sag: the output sags with time.
-
-Symptom   the residual follows time.
-"""
-from calibrations.effect import Parameter
-PARAMETERS = (Parameter("sag", "{out}/s", typical=1e-4),)
-def output(v, table, p):
-    return v * p["sag"]
-'''
-
-
-def test_the_old_form_of_an_effect_is_answered_by_the_new_one(tmp_path: Path) -> None:
-    (tmp_path / "slow_sag.py").write_text(OLD)
-    with pytest.raises(ModelError) as error:
-        catalogue(tmp_path)
-    for part in (
-        "slow_sag.py",
-        "an effect is a class now",
-        "class SlowSag(Effect):",
-        "def output(self, ",
-        "CONTRIBUTING",
-    ):
-        assert part in str(error.value)
-
-
 SHORT = OWN.replace("Sag(", "Wrong(").replace("sag: ", "wrong: ")
 
 
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("x = 1\n", r"must define one effect, `class Wrong\(Effect\):`; it defines no effect"),
+        ("x = 1\n", r"must define one effect, `class Wrong\(Effect\):`; it defines no effect. See"),
         ("import nowhere_to_be_found\n", "ModuleNotFoundError: No module named"),
-        ("def output(v, table, p):\n    return v\n", "an effect is a class now"),
+        ("def output(v, table, p):\n    return v\n", 'it defines no effect. See "An effect" in CONTRIBUTING.md'),
         (SHORT.replace("Symptom", "Sympton"), "the docstring of Wrong must begin with"),
         (SHORT.replace("wrong: the", "the"), "the docstring of Wrong must begin with"),
         (SHORT.replace("sag =", "_sag ="), "Wrong has no parameter"),
