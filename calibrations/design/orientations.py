@@ -17,7 +17,7 @@ from itertools import product
 import numpy as np
 
 from calibrations.design.optimal_design import DOptimal, information_gain
-from calibrations.geometry.sphere import harmonics, sphere_centre
+from calibrations.geometry.sphere import harmonics, sphere_centre, unit_vectors
 from calibrations.table import AXES, Array
 
 FIRST_SIDES = 6  # only whole sides are requested until the centre of the sphere is known, after five positions
@@ -53,8 +53,7 @@ def directions_up(outputs: Array, named_directions: Array) -> Array:
     """
     if len(outputs) < CENTRE_POSITIONS:
         return named_directions
-    centred = outputs - sphere_centre(outputs)
-    return np.asarray(centred / np.linalg.norm(centred, axis=1, keepdims=True))
+    return unit_vectors(outputs - sphere_centre(outputs))
 
 
 def next_orientation(measured: Array, last: Array | None = None, sides: int = FIRST_SIDES) -> Next:

@@ -16,7 +16,7 @@ import numpy as np
 
 from calibrations.criteria import LEAST_MAIN_SLOPE, LEAST_OTHER_AXIS, MOST_MAGNITUDE_SPREAD, UPRIGHT_COSINE
 from calibrations.errors import DataError
-from calibrations.geometry.sphere import estimate_faces
+from calibrations.geometry.sphere import estimate_faces, unit_vectors
 from calibrations.table import AXES, Array, Table
 
 EARTH_DEG_S = np.degrees(7.292115e-5)
@@ -132,8 +132,7 @@ def vertical_deg_s(table: Table) -> float:
 def _up(table: Table) -> Array:
     """The vertical in the sensor's frame, shape (n, 3); the table's axis without an accelerometer."""
     if all(f"a{axis}" in table for axis in AXES):
-        a = specific_force_g(table)
-        return np.asarray(a / np.linalg.norm(a, axis=1, keepdims=True))
+        return unit_vectors(specific_force_g(table))
     return turn_axes(table)
 
 

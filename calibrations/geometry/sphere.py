@@ -52,8 +52,12 @@ def magnetometer_coverage_warning(table: Table) -> str | None:
 
 def directions(table: Table) -> Array:
     """Unit vectors (n, 3) from the centre of the sphere fitted to the outputs."""
-    centred = table.outputs - sphere_centre(table.outputs)
-    return np.asarray(centred / np.maximum(np.linalg.norm(centred, axis=1, keepdims=True), np.finfo(float).tiny))
+    return unit_vectors(table.outputs - sphere_centre(table.outputs))
+
+
+def unit_vectors(vectors: Array) -> Array:
+    """The directions of vectors (n, 3); 0 where a vector is 0."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), np.finfo(float).tiny))
 
 
 def sphere_centre(means: Array) -> Array:
@@ -100,8 +104,7 @@ class Faces:
 def estimate_faces(outputs: Array) -> Faces | None:
     """From outputs at rest (n, 3), averaged over each face; None if an axis was not measured both up and down."""
     middle = (outputs.max(axis=0) + outputs.min(axis=0)) / 2
-    size = np.linalg.norm(outputs - middle, axis=1, keepdims=True)
-    cosine = (outputs - middle) / np.where(size > 0, size, 1.0)
+    cosine = unit_vectors(outputs - middle)
     up, down = (_mean_along(outputs, side * cosine) for side in (1, -1))
     if up is None or down is None:
         return None

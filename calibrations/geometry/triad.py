@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import least_squares
 
-from calibrations.geometry.sphere import sphere_centre
+from calibrations.geometry.sphere import sphere_centre, unit_vectors
 from calibrations.table import Array
 
 LOWER = np.tril_indices(3)
@@ -39,8 +39,3 @@ def _correct(scaled: Array, theta: Array) -> Array:
     matrix = np.zeros((3, 3))
     matrix[LOWER] = theta[3:]
     return np.asarray((scaled - theta[:3]) @ matrix.T)
-
-
-def unit_vectors(vectors: Array) -> Array:
-    """The directions of vectors (n, 3); 0 where a vector is 0."""
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), np.finfo(float).tiny))

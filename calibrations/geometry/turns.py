@@ -32,7 +32,8 @@ from calibrations.criteria import FEWEST_TURNS_OF_A_GYROSCOPE, SMALLEST_TURN_DEG
 from calibrations.errors import DataError, TooFewRows
 from calibrations.geometry.clipped_turns import find_clipped_turns
 from calibrations.geometry.rate_table import at_rest, vertical_deg_s
-from calibrations.geometry.triad import gravity_directions, unit_vectors
+from calibrations.geometry.sphere import unit_vectors
+from calibrations.geometry.triad import gravity_directions
 from calibrations.table import AXES, Array, Table
 
 CHANNELS = ("along the turn", "across the turn", *(f"{axis} at rest" for axis in AXES))
@@ -246,8 +247,7 @@ def _bases(axis: Array, after: Array) -> Array:
     along = axis - np.sum(axis * after, axis=1)[:, None] * after
     other = np.cross(after, np.eye(3)[np.argmin(np.abs(after), axis=1)])
     small = np.linalg.norm(along, axis=1) < 1e-3  # a turn about the vertical
-    along = np.where(small[:, None], other, along)
-    along = along / np.linalg.norm(along, axis=1, keepdims=True)
+    along = unit_vectors(np.where(small[:, None], other, along))
     return np.stack([along, np.cross(after, along)], axis=1)
 
 

@@ -59,6 +59,14 @@ class Run:
         return [f"{self.run}/{sensor}" for sensor in self.batch] or [self.run]
 
     @property
+    def instruments(self) -> dict[str, str]:
+        """The identity of each instrument by its role, as text."""
+        return {
+            role: " ".join(str(part) for part in identity.values() if part)
+            for role, identity in self.identities.items()
+        }
+
+    @property
     def extent(self) -> str:
         """The number of poses, rows or turns, as text. A record without gaps consists of many blocks."""
         if not self.bench:

@@ -69,16 +69,13 @@ def soak_report_of(data: str, date: str, program: str) -> Page | None:
 def _facts(measured: MeasuredRun, date: str, program: str) -> Mapping[str, str]:
     run = measured.run
     sensor = [str(measured.constants[name]) for name in ("sensor", "serial") if name in measured.constants]
-    texts = {
-        role: " ".join(str(part) for part in identity.values() if part) for role, identity in run.identities.items()
-    }
     return {
         "sensor": " ".join(sensor) or run.source,
         "run": f"{measured.name}, {run.state}",
         "begun": run.created,
         "ended": run.ended or "–",
         "settings": ", ".join(f"{name} {value}" for name, value in run.settings.items()),
-        **texts,
+        **run.instruments,
         "program": program,
         "date": date,
     }

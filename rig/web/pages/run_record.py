@@ -345,13 +345,10 @@ def _results(run: Run) -> None:
 
 def _circumstances(run: Run) -> tuple[dict[str, str], ...]:
     """The run and its settings, the instruments, the constants of sensor and rig."""
-    identities = {
-        role: " ".join(str(part) for part in identity.values() if part) for role, identity in run.identities.items()
-    }
     message = {"message": run.message} if run.message else {}
     settings = {setting_label(name): setting_text(value) for name, value in run.settings.items()}
     constants = {setting_label(name): setting_text(value) for name, value in run.constants.items()}
-    return {"procedure": run.procedure, "bench or file": run.source, **message, **settings}, identities, constants
+    return {"procedure": run.procedure, "bench or file": run.source, **message, **settings}, run.instruments, constants
 
 
 def _event(event: Event) -> tuple[str, str, str]:
