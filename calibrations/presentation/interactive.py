@@ -289,6 +289,7 @@ def _bars(s: c.Bars, panel: c.Panel) -> Parts:
         "text": [f"\u2003{text}\u2003" if k not in starts else "" for k, text in enumerate(s.texts)],
         "textposition": ["auto" if inside else "outside" for inside in s.inside],  # outside a bar of few pixels
         "textangle": 0,
+        "constraintext": "none",  # readable in a low bar too
         "insidetextanchor": "start",
         "hovertemplate": [f"{name}: {text}" for name, text in zip(panel.y.names, s.texts, strict=True)],
         "name": s.label,

@@ -125,7 +125,8 @@ class ModelSession(Generic[F]):
 
         An effect that the data cannot have without it is left out as well, with a note.
         """
-        return self.with_added([text for text, added in zip(self.added, self.names, strict=True) if added != name])
+        remaining = [text for text, added in zip(self.added, self.names, strict=True) if added != name]
+        return self.with_added(remaining, f"Removing {name}, fitting {{}} again")
 
     @property
     def added(self) -> tuple[str, ...]:
@@ -133,10 +134,11 @@ class ModelSession(Generic[F]):
         effects = (step.effect for step in self.steps)
         return tuple(f"{effect.name}={effect.expression}" if effect.expression else effect.name for effect in effects)
 
-    def with_added(self, texts: Sequence[str]) -> ModelSession[F]:
+    def with_added(self, texts: Sequence[str], progress: str = "Adding {}") -> ModelSession[F]:
         """The session with exactly these added effects, in the form of `added`.
 
-        The common beginning stays. An effect that the data cannot have is left out, with a note.
+        The common beginning stays. An effect that the data cannot have is left out, with a note. `progress` is reported
+        with the name of each effect that is fitted.
         """
         equal = takewhile(lambda pair: pair[0] == pair[1], zip(self.added, texts, strict=False))
         common = sum(1 for _ in equal)
@@ -150,7 +152,7 @@ class ModelSession(Generic[F]):
                 else:
                     effect = session.written(name, expression if equals else text)
                     session = session.with_own(effect)
-                report(f"Adding {name}")
+                report(progress.format(name))
                 session = session.with_step(session.tried(effect))
             except CalibrationError as error:
                 note = f"{name} is not in the model any more: {error}"

@@ -14,6 +14,11 @@ from tests.browser.measured import two_faults
 pytestmark = pytest.mark.slow
 
 BARS = "[aria-label*=' by model'] .bars .point"
+# the verdict with the error beside it, at each change
+WATCH = """() => { window.seen = []; const text = name => document.querySelector(`.verdict ${name}`)?.textContent;
+  const look = () => seen.push([text('.headline'), text('.figure .value')]);
+  new MutationObserver(look).observe(document.querySelector('.verdict'),
+    {subtree: true, childList: true, characterData: true}); look(); }"""
 
 
 def test_all_effects_are_added_at_a_click_and_any_can_be_removed(workbench: Workbench, tmp_path: Path) -> None:
@@ -30,11 +35,14 @@ def test_all_effects_are_added_at_a_click_and_any_can_be_removed(workbench: Work
     page.set_viewport_size({"width": TABLET["height"], "height": TABLET["width"]})
     for name in ("Discover: add all 2 effects", "Add "):
         expect(page.get_by_role("button", name=name).first).to_be_in_viewport()
+    page.evaluate(WATCH)
     discover.click()
     expect(page.get_by_text("Step 1 of 2: adding").or_(page.get_by_text("Step 2 of 2: adding"))).to_be_visible()
     expect(page.locator(BARS)).to_have_count(3)
     expect(headline).to_contain_text("Remaining error: 0.9")
     expect(page.get_by_role("button", name="Discover")).to_have_count(0)
+    verdicts = {(verdict, error) for verdict, error in page.evaluate("seen") if not verdict.endswith(" ...")}
+    assert len(verdicts) == len(dict(verdicts)) == 3, verdicts  # each verdict is that of the model with this error
     removes = page.locator(".added").get_by_role("button")
     expect(removes).to_have_count(2)
     names = [each.get_attribute("aria-label") or "" for each in removes.all()]

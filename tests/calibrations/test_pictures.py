@@ -21,6 +21,7 @@ from calibrations.model import Model
 from calibrations.model.file import read_model
 from calibrations.noise.comparison import DeviationComparison
 from calibrations.presentation.chart import Bars, Chart, Line, Panel, Points, Second, single_chart
+from calibrations.presentation.charts import contribution
 from calibrations.presentation.charts import fit as charts
 from calibrations.presentation.charts.discovery import (
     MOST_CURVES,
@@ -201,19 +202,56 @@ def test_an_effect_is_a_line_only_over_a_column_that_it_is_a_function_of() -> No
     for name, wanted in (("temperature_c", Line), ("beta", Points)):
         series = charts.residual(ChannelResidual(warm().start, 0, False), found[name], found["alpha_deg"], step).series
         assert isinstance(series[-1], wanted)
-    change = charts.change_of(step)[0]
+    change = contribution.change_of(step)[0]
     np.testing.assert_allclose(series[-1].y, 1e3 * change)  # type: ignore[union-attr] # a cross at the change of each row
     assert len(change) == table.n
 
 
-def test_poses_that_are_held_again_and_again_are_drawn_over_time() -> None:
+def soaked() -> Fit:
+    """Four poses, visited 20 times each, of a sensor whose bias drifts."""
     beta = np.tile([0.0, 90.0, 180.0, 270.0], 20)
     soak = {"alpha_deg": np.full(80, 90.0), "beta_deg": beta, "direction": np.ones(80), "t_s": 60.0 * np.arange(80)}
     x, y, _ = components(soak)
-    warming = fit(read_model("linear"), poses(soak, 2.5 + x + 1e-5 * soak["t_s"], 2.5 + y))
+    return fit(read_model("linear"), poses(soak, 2.5 + x + 1e-5 * soak["t_s"], 2.5 + y))
+
+
+def test_poses_that_are_held_again_and_again_are_drawn_over_time() -> None:
+    warming = soaked()
     assert first_choices(list(choices(warming)), warming.table) == ("time", "beta")
     once = fits()["two axes"]
     assert first_choices(list(choices(once)), once.table) == ("beta", "alpha_deg")
+
+
+def test_over_time_the_model_is_a_thin_line_for_each_pose_and_the_pattern_has_a_row_for_each() -> None:
+    found = soaked()
+    panel = panels(charts.measurement_chart(found))[0]
+    line, marks = panel.series
+    assert isinstance(line, Line)
+    assert isinstance(marks, Points)
+    assert np.count_nonzero(np.isnan(line.x)) == 4
+    (pattern,) = panels(charts.failure_chart(found))[:1]
+    assert pattern.y.names == ("90, 0 ▲", "90, 90 ▲", "90, 180 ▲", "90, 270 ▲")
+    assert pattern.x.label == "time (min); ▲ turning clockwise, ▼ anticlockwise"
+    np.testing.assert_array_equal(dots(pattern).y, np.tile([0.0, 1.0, 2.0, 3.0], 20))
+    assert len(np.unique(dots(pattern).x)) == 80
+
+
+def test_the_line_of_the_model_is_broken_where_poses_are_excluded() -> None:
+    table = warm().start.table
+    excluded = (
+        (table.column("alpha_deg") == 90.0) & (table.column("direction") > 0) & (table.column("beta_deg") == 90.0)
+    )
+    assert np.count_nonzero(excluded) == 1
+    for rows, breaks in ((np.ones(table.n, dtype=bool), 0), (~excluded, 1)):
+        kept = fit(read_model("linear"), table.rows(rows))
+        line = next(series for series in panels(charts.measurement_chart(kept))[0].series if isinstance(series, Line))
+        stretches = len({*zip(kept.table.column("alpha_deg"), kept.table.column("direction"), strict=True)})
+        assert np.count_nonzero(np.isnan(line.x)) == stretches + breaks
+
+
+def test_texts_of_bars_keep_their_size() -> None:
+    (trace,) = [trace for trace in figure(waterfall(levels(warm())), "k")["data"] if trace["type"] == "bar"]
+    assert trace["constraintext"] == "none"
 
 
 def test_the_map_of_positions_is_of_equal_area() -> None:
@@ -227,7 +265,7 @@ def test_the_map_of_positions_is_of_equal_area() -> None:
 def test_an_effect_is_drawn_over_what_it_follows() -> None:
     (step,) = warm().steps
     assert step.name == "temperature-bias"
-    assert charts.select_telling_column(step).name == "temperature_c"
+    assert contribution.select_telling_column(step).name == "temperature_c"
     left, right, *_ = panels(effect_chart(step))
     kelvin = step.before.table.column("temperature_c")
     assert drawn(left) == points(kelvin, 1e3 * step.before.residual[0])
@@ -243,7 +281,7 @@ def test_a_quadratic_is_drawn_over_the_axis_itself() -> None:
     table = poses(columns, 2.5 + x + 2e-3 * x**2, 2.5 + y + 1e-3 * y**2)
     before = fit(read_model("linear"), table)
     step = Step("quadratic-nonlinearity", before, fit(with_(before.model, "quadratic-nonlinearity"), table))
-    column = charts.select_telling_column(step)
+    column = contribution.select_telling_column(step)
     assert column.labels == ("specific force along x (g)", "specific force along y (g)")
     np.testing.assert_allclose(column.values[0], x[step.before.table.order], atol=1e-12)
 
@@ -254,9 +292,9 @@ def test_where_no_column_tells_the_change_itself_is_drawn() -> None:
     table = poses(columns, 2.5 + x + 5e-3 * x * z, 2.5 + y - 5e-3 * y * z)
     before = fit(read_model("linear"), table)
     step = Step("z-axis-scale", before, fit(with_(before.model, "z-axis-scale"), table))
-    column = charts.select_telling_column(step)
+    column = contribution.select_telling_column(step)
     assert column.name == "change"
-    ((_, along, curve),) = charts.curves(step, column, 0)
+    ((_, along, curve),) = contribution.curves(step, column, 0)
     np.testing.assert_allclose(along, 1e3 * curve)  # the diagonal
 
 
@@ -276,9 +314,9 @@ def test_a_function_of_a_column_is_explained_by_it_and_noise_is_not() -> None:
     x = np.linspace(0, 10, 500)[None]
     noise = np.random.default_rng(0).standard_normal((1, 500))
     sides = np.where(np.arange(500) % 2, 1.0, -1.0)
-    assert charts.explained_share(np.sin(x) * sides, x, sides) > 0.95
-    assert charts.explained_share(noise, x, sides) < 0.3
-    assert charts.explained_share(0 * x, x, sides) == 0
+    assert contribution.explained_share(np.sin(x) * sides, x, sides) > 0.95
+    assert contribution.explained_share(noise, x, sides) < 0.3
+    assert contribution.explained_share(0 * x, x, sides) == 0
 
 
 def test_the_waterfall_falls_from_level_to_level() -> None:

@@ -45,6 +45,12 @@ def test_any_added_effect_is_removed_and_the_others_stay(turned: ModelSession) -
     for name in ("quadratic-nonlinearity", "axis-misalignment", "stage-eccentricity"):
         grown = grown.with_step(grown.tried(grown.effects[name]))
     assert [step.effect.name for step in grown.steps] == list(grown.names)
+    steps = list[str]()
+    with show_progress(steps.append):
+        grown.removed("quadratic-nonlinearity")
+    assert steps == [
+        f"Removing quadratic-nonlinearity, fitting {name} again" for name in ("axis-misalignment", "stage-eccentricity")
+    ]
     for name in grown.names:
         left = grown.removed(name)
         assert left.names == tuple(each for each in grown.names if each != name)

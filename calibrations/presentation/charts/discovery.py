@@ -26,15 +26,8 @@ from calibrations.presentation.chart import (
     Span,
     single_chart,
 )
-from calibrations.presentation.charts.fit import (
-    change_of,
-    drawn_channels,
-    fit_album,
-    residual,
-    row_height,
-    scale_of,
-    select_telling_column,
-)
+from calibrations.presentation.charts.contribution import change_of, select_telling_column
+from calibrations.presentation.charts.fit import drawn_channels, fit_album, residual, row_height, scale_of
 from calibrations.presentation.charts.motion import evaluation
 from calibrations.presentation.charts.places import Falling, place_pictures
 from calibrations.presentation.residual import ChannelResidual, choices, first_choices

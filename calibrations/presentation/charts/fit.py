@@ -35,14 +35,14 @@ from calibrations.presentation.chart import (
     stack_panels,
 )
 from calibrations.presentation.charts import motion
+from calibrations.presentation.charts.contribution import change_of, curves, is_function
 from calibrations.presentation.residual import (
     ChannelResidual,
     Column,
     choices,
     columns,
     first_choices,
-    residual_unit,
-    select_telling_columns,
+    repeats,
     specific_force,
     zero,
 )
@@ -51,9 +51,13 @@ from calibrations.table import MILLI, Array
 PALE = 3.0  # times the noise floor: below, noise alone stays pale
 APART = 0.22  # of the step between rows of inclinations, by which both directions of turning are set apart
 MOST_INCLINATIONS = 16  # with a row each; more are drawn at their true angles, both directions at one place
-LARGEST_MISS = 0.1  # part of the change's rms by which a curve may miss the change of single rows
 SIDES: dict[int, Symbol] = {1: "circle", -1: "circle-open", 0: "circle"}
 PLACES: dict[int, Symbol] = {1: "triangle-up", -1: "triangle-down", 0: "circle"}
+SIGNS = {1: " ▲", -1: " ▼", 0: ""}  # after the angles of a pose
+VISITS_CAPTION = "The residual of the model {} at each pose over time; pale is near the noise."
+TURNING = "▲ turning clockwise, ▼ anticlockwise"
+GAP = 1.5  # times the usual step between two poses: a pose between them is missing
+VISIT_PX = 6.0  # a marker of a pose that is visited again and again
 TOWARDS = "towards x; left: z upwards, right: z downwards (equal-area map)"
 HALF_SPHERES = 2.3  # between the centres of both maps
 SMALL_ROW, ROW = 2.0, 3.0  # inches: a motion has many channels
@@ -64,7 +68,8 @@ ACROSS_PX, DOWN_PX, LEAST_PX, MOST_PX = 900.0, 330.0, 3.0, 10.0  # of a map of p
 def fit_album(fit: Fit) -> list[Picture]:
     """The model and its data, the residual, and the residual pattern."""
     model, kind = fit.model.name, fit.table.type
-    measurement_words, failure_words = (text.format(model) for text in (kind.measurement_caption, kind.failure_caption))
+    failure_caption = VISITS_CAPTION if _visits_repeatedly(fit) else kind.failure_caption
+    measurement_words, failure_words = (text.format(model) for text in (kind.measurement_caption, failure_caption))
     difference = f"Measured less the model {model}. The grey band is the noise floor, one standard deviation each way."
     if len(fit.channels) > len(drawn_channels(fit, fit.residual)):
         difference += f" Only the {MOST_ROWS} outputs with the largest residual are drawn."
@@ -130,27 +135,37 @@ def row_height(fit: Fit) -> float:
 
 
 def measurement(channel: ChannelResidual, x: Column, colour: Column) -> Panel:
-    """Dots are measured, the line is the model (crosses where rows share no curve); output over `x`."""
+    """Dots are measured, the line is the model (crosses where rows share no curve, below the dots); output over `x`."""
     c, rows, fit = channel.c, channel.rows, channel.fit
     measured, model, label = _outputs(channel)
     hover = [f"{value:.6g}<br>{text}" for value, text in zip(measured[rows], channel.hover, strict=True)]
     dots = _dots(channel, x.values[c, rows], measured[rows], colour, hover)
     curve_hover = "model: %{y:.6g}"
-    if x.name == "beta":
-        lines = (Line(*_stretches(channel, x.values[c], model), width=1.2, hover=curve_hover),)
-        series: tuple[Series, ...] = (*lines, dots)
-    elif fit.table.type.magnitude:
+    series: tuple[Series, ...]
+    if fit.table.type.magnitude:
         std = fit.noise.fast[0, rows]
         dots = replace(dots, low=dots.y - std, high=dots.y + std)
         series = (Rule(1.0, colour=MODEL, width=1.2), dots)
+    elif model_is_line(fit, x):
+        series = (Line(*_stretches(channel, x, model), width=1.2, hover=curve_hover), dots)
     else:
-        crosses = Points(x.values[c, rows], model[rows], colour=MODEL, symbol="cross", size=9)
-        series = (dots, crosses)
+        series = (Points(x.values[c, rows], model[rows], colour=MODEL, symbol="cross", size=9), dots)
     title = _title(fit, c)
     second = None
     if not channel.in_g and fit.table.type.stage_angles:
         second = Second(float(scales(fit)[c]), zero(fit, c), f"{fit.table.input_unit}, by bias and scale factor")
     return Panel(series, _axis(x, c), Axis(label), title, second=second)
+
+
+def model_is_line(fit: Fit, x: Column) -> bool:
+    """Whether the model is a line over `x`: over the angle, or over the time of poses that are visited repeatedly."""
+    if fit.table.type.magnitude or fit.table.type.moving:
+        return True
+    return x.name == "beta" or (x.name == "time" and _visits_repeatedly(fit))
+
+
+def _visits_repeatedly(fit: Fit) -> bool:
+    return fit.table.type.stage_angles and repeats(fit.table)
 
 
 def residual(
@@ -207,6 +222,8 @@ def _title(fit: Fit, c: int) -> str:
 def _marker_px(channel: ChannelResidual) -> float:
     """Markers of neighbouring poses, and of both directions of turning, must not overlap."""
     table = channel.fit.table
+    if _visits_repeatedly(channel.fit):
+        return VISIT_PX
     if not table.type.stage_angles:
         return MOST_PX
     columns_across, rows_down = (len(np.unique(table.column(name))) for name in ("beta_deg", "alpha_deg"))
@@ -251,17 +268,29 @@ def _outputs(channel: ChannelResidual) -> tuple[Array, Array, str]:
     return (measured - offset) / channel.scale, (model - offset) / channel.scale, label
 
 
-def _stretches(channel: ChannelResidual, x: Array, model: Array) -> tuple[Array, Array]:
-    """The model over x, one stretch for each inclination and direction of turning, with gaps between."""
-    table, abscissas, values = channel.fit.table, [], []
-    groups = np.stack([table.optional("alpha_deg", 0.0), table.optional("direction", 0.0)])[:, channel.rows]
+def _stretches(channel: ChannelResidual, x: Column, model: Array) -> tuple[Array, Array]:
+    """The model over x, one stretch for each inclination (over time: each pose) and direction of turning.
+
+    Gaps are between the stretches, and where poses are missing, for example because a person excluded them.
+    """
+    table, at, abscissas, values = channel.fit.table, x.values[channel.c], [], []
+    names = ("alpha_deg", "direction") if x.name == "beta" else ("alpha_deg", "beta_deg", "direction")
+    groups = np.stack([table.optional(name, 0.0) for name in names])[:, channel.rows]
     _, group = np.unique(groups, axis=1, return_inverse=True)
     for k in range(int(group.max(initial=-1)) + 1):
         rows = channel.rows[group.ravel() == k]
-        order = rows[np.argsort(x[rows], kind="stable")]
-        abscissas += [*x[order], np.nan]
-        values += [*model[order], np.nan]
+        order = rows[np.argsort(at[rows], kind="stable")]
+        gaps = _gaps(at[order])
+        abscissas += [*np.insert(at[order], gaps, np.nan), np.nan]
+        values += [*np.insert(model[order], gaps, np.nan), np.nan]
     return np.array(abscissas), np.array(values)
+
+
+def _gaps(at: Array) -> NDArray[np.intp]:
+    """The indices in increasing `at` before which a gap is larger than the usual step."""
+    steps = np.diff(at)
+    usual_step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+    return np.flatnonzero(steps > GAP * usual_step) + 1
 
 
 def _mark_explained(step: Step[Fit], x: Column, channel: ChannelResidual) -> Iterator[Line | Points]:
@@ -281,9 +310,11 @@ def _mark_explained(step: Step[Fit], x: Column, channel: ChannelResidual) -> Ite
 def _map(channel: ChannelResidual) -> tuple[Array, Array, tuple[Axis, Axis]]:
     """The place of each row, and the axes."""
     fit = channel.fit
+    if _visits_repeatedly(fit):
+        return _visits(channel)
     if fit.table.type.stage_angles:
         alpha, side = fit.table.column("alpha_deg"), np.sign(fit.table.optional("direction", 0.0))
-        label = Axis("β (deg); ▲ turning clockwise, ▼ anticlockwise", ticks="quarters")
+        label = Axis(f"β (deg); {TURNING}", ticks="quarters")
         inclinations, row = np.unique(alpha, return_inverse=True)
         if len(inclinations) > MOST_INCLINATIONS:
             return fit.table.column("beta_deg"), alpha, (label, Axis("α (deg)"))
@@ -300,84 +331,14 @@ def _map(channel: ChannelResidual) -> tuple[Array, Array, tuple[Axis, Axis]]:
     return first.values[channel.c], relative, (Axis(first.labels[channel.c]), Axis("residual / noise floor"))
 
 
-# The column that an effect's curve is drawn over: the change of the residual is nearest to a function of it
-
-
-MOST_PARTS = 24  # of a column, for each direction
-ROWS_IN_A_PART = 6
-LEAST_EXPLAINED = 0.8  # part of the change's variance that a function of the column must give
-EQUAL = 0.02  # columns closer than this are equal: the simpler cause is drawn
-
-
-def change_of(step: Step[Fit]) -> Array:
-    """Reduction of the residual by the effect, the other parameters refitted, shape (channels, n)."""
-    return step.before.residual - step.after.residual
-
-
-def select_telling_column(step: Step[Fit]) -> Column:
-    """The simplest column that explains the change; the change itself if no column explains it."""
-    change, sides = change_of(step) / step.before.noise.floor[:, None], _sides(step)
-    effect = next(term.effect for term in step.after.model.terms if term.name == step.name)
-    candidates = select_telling_columns(step.before, effect)
-    shares = np.array([explained_share(change, column.values, sides) for column in candidates])
-    if step.before.table.type.moving:
-        return candidates[0]
-    if shares.max() < LEAST_EXPLAINED:
-        label = f"change made by {step.name} ({residual_unit(step.before)})"
-        return Column("change", (label,) * len(change), 1e3 * change_of(step))
-    return candidates[int(np.argmax(shares >= shares.max() - EQUAL))]
-
-
-def explained_share(change: Array, values: Array, sides: Array) -> float:
-    """Share of the change's variance that is a function of the column, by side; shapes (channels, n)."""
-    unexplained = 0.0
-    for y, x in zip(change, values, strict=True):
-        part = _parts(x, sides)
-        mean = np.bincount(part, y) / np.bincount(part)
-        unexplained += float(np.sum((y - mean[part]) ** 2))
-    total = float(np.sum((change - change.mean(axis=1, keepdims=True)) ** 2))
-    return 1 - unexplained / total if total > 0 else 0.0
-
-
-def curves(step: Step[Fit], column: Column, c: int) -> Iterator[tuple[float, Array, Array]]:
-    """The change as a function of the column: (direction of turning, column, change), means in parts of the column."""
-    change, sides = change_of(step)[c], _sides(step)
-    if column.name == "change":
-        ends = np.array([change.min(), change.max()])
-        yield 1.0, 1e3 * ends, ends
-        return
-    part = _parts(column.values[c], sides)
-    count = np.bincount(part)
-    x, y, side = (np.bincount(part, values) / count for values in (column.values[c], change, sides))
-    for s in np.unique(side):
-        rows = np.flatnonzero(side == s)
-        rows = rows[np.argsort(x[rows], kind="stable")]
-        yield float(s), x[rows], y[rows]
-
-
-def is_function(step: Step[Fit], column: Column, c: int) -> bool:
-    """Whether the curves of the change over `column` pass through the change of the single rows.
-
-    They may miss them by MISSED of the change's rms, or by the noise floor of one row.
-    """
-    if column.name == "change" or step.before.table.type.moving:
-        return True
-    change, sides, x = change_of(step)[c], _sides(step), column.values[c]
-    missed = np.zeros(len(change))
-    for side, abscissas, values in curves(step, column, c):
-        rows = sides == side
-        missed[rows] = change[rows] - np.interp(x[rows], abscissas, values)
-    limit = max(LARGEST_MISS * float(rms(change)), float(step.before.noise.floor[c]))
-    return float(rms(missed)) <= limit
-
-
-def _sides(step: Step[Fit]) -> Array:
-    return step.before.table.optional("direction", 0.0)
-
-
-def _parts(x: Array, sides: Array) -> NDArray[np.intp]:
-    """Part number of each row. Parts are ranges of the column with equal numbers of rows, for each side separately."""
-    most = min(MOST_PARTS, max(len(x) // ROWS_IN_A_PART, 2))
-    edges = np.unique(np.quantile(x, np.linspace(0, 1, most + 1)[1:-1]))
-    keys = np.stack([np.searchsorted(edges, x, side="right"), sides])
-    return np.asarray(np.unique(keys, axis=1, return_inverse=True)[1]).ravel()
+def _visits(channel: ChannelResidual) -> tuple[Array, Array, tuple[Axis, Axis]]:
+    """A row for each pose that is visited repeatedly, over time."""
+    fit = channel.fit
+    time = columns(fit)[1]
+    sides = np.sign(fit.table.optional("direction", 0.0))
+    angles = np.column_stack([fit.table.column("alpha_deg").round(), fit.table.column("beta_deg").round(), sides])
+    poses, row = np.unique(angles, axis=0, return_inverse=True)
+    names = tuple(f"{alpha:g}, {beta:g}{SIGNS[int(side)]}" for alpha, beta, side in poses)
+    turning = f"; {TURNING}" if np.any(sides) else ""
+    axes = Axis(f"{time.labels[channel.c]}{turning}"), Axis("α, β (deg)", names=names)
+    return time.values[channel.c], row.ravel().astype(float), axes

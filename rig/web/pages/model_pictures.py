@@ -14,8 +14,9 @@ from calibrations.discovery.places import rows_at
 from calibrations.fitting.fit import axis_of
 from calibrations.presentation.chart import single_chart
 from calibrations.presentation.charts import motion
+from calibrations.presentation.charts.contribution import is_function, select_telling_column
 from calibrations.presentation.charts.discovery import levels, waterfall
-from calibrations.presentation.charts.fit import failure, is_function, measurement, residual, select_telling_column
+from calibrations.presentation.charts.fit import failure, measurement, model_is_line, residual
 from calibrations.presentation.interactive import figure
 from calibrations.presentation.residual import ChannelResidual, Column, choices, first_choices, residual_units
 from rig.web.parts import box, div, redraw, words
@@ -190,7 +191,7 @@ class Pictures(AxisAndUnit):
         """Explain marks, lines and bands."""
         kind = channel.fit.table.type
         sides = "; filled clockwise, open anticlockwise" if np.any(channel.side) else ""
-        model = "line" if abscissa.name == "beta" or kind.magnitude or kind.moving else "+"
+        model = "line" if model_is_line(channel.fit, abscissa) else "+"
         effect = ""
         if self.step is not None:
             line = is_function(self.step, self.columns[self.x.value], channel.c)

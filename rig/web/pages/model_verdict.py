@@ -62,13 +62,14 @@ class VerdictBox:
             ui.button("Cancel", icon="close", on_click=cancel).props("dense flat")
 
     def error(self, compared: Comparison[Any], session: ModelSession[Any]) -> None:
-        """Show the error and where it is largest, before the diagnosis."""
+        """Show the error of a model and where it is largest, in place of the verdict on the model before."""
+        self.wait(SEARCHING)
         with afresh(self.numbers):
             for name, value in view_of(session.data).figures(compared.fit).items():
                 with div("figure"):
                     words(value, "value")
                     words(name, "quiet small")
-        self.described, self.watched = _show_failing(compared), None
+        self.described = _show_failing(compared)
         self._show(self.described)
 
     def wait(self, activity: str, visit: Visit | None = None) -> None:
