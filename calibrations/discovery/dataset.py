@@ -126,7 +126,9 @@ class Dataset(ABC, Generic[F]):
     def follow_plan(self, plan: Findings[F], k: int, effects: Mapping[str, Effect]) -> Findings[F]:
         """The remaining findings of a search after its first `k` steps."""
         start = plan.steps[k - 1].after
-        remaining = replace(plan, added=(*plan.added, *plan.names[:k]), steps=plan.steps[k:])
+        taken = plan.names[:k]
+        followed = (*plan.followed, *(name for name in taken if plan.causes and name not in plan.causes))
+        remaining = replace(plan, added=(*plan.added, *taken), followed=followed, steps=plan.steps[k:])
         return replace(
             remaining,
             start=start,

@@ -140,6 +140,7 @@ class Findings(Evidence, Generic[F]):
     origin        the model that the search began with: an earlier one where a person added effects one by one
     baseline      the given model on data without disturbances
     added         effects that a person added before the given model
+    followed      those of them that a search proposed, and not as causes
     steps         the effects that it misses, in the order in which they are added
     tried         the steps of the search, where none is kept
     candidates    every effect alone on top of the baseline; the effect of the first step comes first
@@ -160,6 +161,7 @@ class Findings(Evidence, Generic[F]):
     origin: F
     baseline: F
     added: tuple[str, ...] = ()
+    followed: tuple[str, ...] = ()
     steps: tuple[Step[F], ...] = ()
     tried: tuple[Step[F], ...] = ()
     candidates: tuple[Candidate, ...] = ()
@@ -188,8 +190,12 @@ class Findings(Evidence, Generic[F]):
     @property
     def curves(self) -> tuple[str, ...]:
         """Free forms of the steps at places of unknown cause: what acts there, and not the form of a cause."""
-        forms = {f"{PREFIX}{place.name}" for place in self.places if place.unknown}
-        return tuple(name for name in self.names if name in forms)
+        return tuple(name for name in self.names if name in self._unknown_forms)
+
+    @property
+    def _unknown_forms(self) -> frozenset[str]:
+        """The free forms at places of unknown cause."""
+        return frozenset(f"{PREFIX}{place.name}" for place in self.places if place.unknown)
 
     @property
     def end(self) -> F:
@@ -199,9 +205,13 @@ class Findings(Evidence, Generic[F]):
     @cached_property
     def given(self) -> Judgement:
         """The judgement on the given model; on the model before the added effects if no further effect is missing."""
-        fit = self.origin if self.added and not self._missing else self.start
-        judgement = self._judge(fit, self.added, self.undetermined[0])
-        refinements = tuple(name for name in self.refinements if name in self._missing) if self.causes else ()
+        is_complete = bool(self.added) and not self._missing
+        added = sorted((name for name in self.added if name not in self.followed), key=self._order_of_causes)
+        judgement = self._judge(self.origin if is_complete else self.start, tuple(added), self.undetermined[0])
+        if is_complete:
+            refinements = tuple(name for name in self.followed if name not in self._unknown_forms)
+        else:
+            refinements = tuple(name for name in self.refinements if name in self._missing) if self.causes else ()
         return replace(judgement, missing=self._missing, refinements=refinements, provisional=not self.settled)
 
     @cached_property
@@ -223,6 +233,10 @@ class Findings(Evidence, Generic[F]):
             floor=self.data.floor,
             **self.shared,
         )
+
+    def _order_of_causes(self, name: str) -> int:
+        """Causes in their own order, as in the judgement on the final model; effects that a person chose are first."""
+        return self.causes.index(name) if name in self.causes else -1
 
     @property
     def _missing(self) -> tuple[str, ...]:

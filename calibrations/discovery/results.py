@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic
 
 from calibrations.discovery.findings import Candidate, F, Findings, Place, Step
-from calibrations.discovery.verdict import Finding, Judgement, Verdict
+from calibrations.discovery.verdict import Finding, Judgement, Verdict, counted
 from calibrations.model import Model
 from calibrations.result import Result
 
@@ -119,6 +119,12 @@ class Diagnosis(_Answer[F]):
     def missing(self) -> tuple[str, ...]:
         """The effects that the model misses, in the order in which a discovery adds them."""
         return self.findings.names
+
+    @property
+    def missing_count(self) -> str:
+        """How many effects the model misses, and how many of them only for the exact form of the others."""
+        refinements = len(self.findings.refinements) if self.findings.causes else 0
+        return counted(len(self.missing) - refinements, refinements)
 
     @property
     def excess_before(self) -> float:

@@ -14,13 +14,13 @@ with the effects that the search added.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from enum import Enum, StrEnum
 from typing import Any
 
 from calibrations.criteria import MATERIAL, MOST_BY_FORM, MOST_UNEXPLAINED, SIGNIFICANT
-from calibrations.text import join_words
+from calibrations.text import count_words, join_words
 
 MOST_NAMED = 4  # missing effects in a short sentence
 
@@ -142,12 +142,12 @@ class Judgement(Evidence):
             return self.text
         if len(self.missing) > MOST_NAMED:
             of_form = sum(name in self.refinements for name in self.missing)
-            form = f", {of_form} of them only for the exact form of the others" if of_form else ""
-            return f'The model "{model}" misses {len(self.missing)} effects{form}.'
+            return f'The model "{model}" misses {counted(len(self.missing) - of_form, of_form)}.'
         if self.missing and is_grown:
             return f'The model "{model}" misses {join_words(self.missing)}.'
         if len(self.added) > MOST_NAMED:
-            return f"{len(self.added)} effects are added. Remaining error: {self.error:.3g} times {self.floor}."
+            effects = counted(len(self.added), len(self.refinements))
+            return f"Added: {effects}. Remaining error: {self.error:.3g} times {self.floor}."
         return self.text
 
     @property
@@ -160,6 +160,15 @@ class Judgement(Evidence):
     @property
     def _complete(self) -> bool:
         return bool(self.added) and self.verdict is Verdict.ADEQUATE
+
+
+def counted(causes: int, refinements: int) -> str:
+    """Numbers of effects, for page, report and terminal: `7 effects, and 6 for their exact form`."""
+    if not causes:
+        return f"{count_words(refinements, 'effect', 'effects')} for the exact form of the others"
+    whose = "its" if causes == 1 else "their"
+    form = f", and {refinements} for {whose} exact form" if refinements else ""
+    return f"{count_words(causes, 'effect', 'effects')}{form}"
 
 
 class Residual(Enum):
@@ -265,7 +274,7 @@ def _details(j: Judgement) -> Iterator[str]:
         whose = others[0] if len(others) == 1 else "the others"
         yield f"Of these, {join_words(of_form)} only describe{'s' * (len(of_form) == 1)} the exact form of {whose}."
     elif j.refinements and (j.added or j.missing or j.unknown):
-        yield f"To describe the exact form of these effects, the model also has {join_words(j.refinements)}."
+        yield refinement_text(len(j.added or j.missing), j.refinements)
     elif j.refinements:
         yield f"The model also has {join_words(j.refinements)}, which noise may explain as well."
     for name in (*j.missing, *j.added):
@@ -273,6 +282,13 @@ def _details(j: Judgement) -> Iterator[str]:
             yield f"This data cannot separate {name} from {join_words(rivals, 'or')}."
     if j.provisional and j.missing:
         yield "Provisional: the names may change when further effects are added."
+
+
+def refinement_text(causes: int, refinements: Sequence[str]) -> str:
+    """The effects that a model has only for the exact form of its causes; many of them with their numbers."""
+    if causes <= MOST_NAMED:
+        return f"To describe the exact form of these effects, the model also has {join_words(refinements)}."
+    return f"The model has {counted(causes, len(refinements))}: {join_words(refinements)}."
 
 
 def _only_compared(j: Judgement) -> bool:

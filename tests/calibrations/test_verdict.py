@@ -53,19 +53,24 @@ def test_effects_that_complete_a_model_are_not_called_missing_from_it(clean: Dia
     followed = replace(clean.findings, candidates=(best,), added=("a",))
     assert "With a, no effect is missing." in followed.given.text  # as `rig discover` writes it
     assert Judgement(model="linear", missing=("a",)).rest == ""
+    formed = replace(clean.findings, added=("c", "a", "b"), followed=("c",), causes=("b", "a")).given
+    assert (formed.added, formed.refinements) == (("b", "a"), ("c",))  # as the judgement on the whole search has them
 
 
 def test_many_effects_are_counted_in_the_short_sentence_and_named_in_the_rest() -> None:
     many = tuple("abcdefg")
     grown = "+".join(("linear", *many))
     added = Judgement(model="linear", added=many, error=1.3, left="a trend", share_left=1e-4)
-    assert added.summary == "7 effects are added. Remaining error: 1.3 times the noise floor."
+    assert added.summary == "Added: 7 effects. Remaining error: 1.3 times the noise floor."
+    with_forms = replace(added, refinements=("x", "y"))
+    assert with_forms.summary == (
+        "Added: 7 effects, and 2 for their exact form. Remaining error: 1.3 times the noise floor."
+    )
+    assert "The model has 7 effects, and 2 for their exact form: x and y." in with_forms.text  # report and terminal
     few = Judgement(model=grown, missing=("h",), added=many)
     assert few.summary == 'The model "linear with 7 added effects" misses h.'
     formed = Judgement(model=grown, missing=many, refinements=("a", "b"))
-    assert formed.summary == (
-        'The model "linear with 7 added effects" misses 7 effects, 2 of them only for the exact form of the others.'
-    )
+    assert formed.summary == ('The model "linear with 7 added effects" misses 5 effects, and 2 for their exact form.')
     assert all(judgement.rest == judgement.text for judgement in (added, few, formed))
     short = Judgement(model="linear", missing=("a",))
     assert (short.summary, short.rest) == (short.text, "")

@@ -17,6 +17,7 @@ from calibrations.criteria import SIGNIFICANT
 from calibrations.design.experiment import Experiment
 from calibrations.discovery.findings import Candidate
 from calibrations.discovery.results import Comparison, Discovery
+from calibrations.discovery.verdict import refinement_text
 from calibrations.fitting.fit import Fit, in_milli, milli_unit, pool_in_milli
 from calibrations.model import Model, Term
 from calibrations.presentation.budget import budget_section
@@ -54,7 +55,7 @@ def _error(discovery: Discovery[Fit]) -> str:
         f"{rounded(start.held_out_excess)} to {rounded(discovery.steps[-1].held_out_after)} × the noise floor."
     )
     if refinements := discovery.judgement.refinements:
-        text += f" For the form of these effects the model also holds {join_words(refinements)}."
+        text += f" {refinement_text(len(discovery.judgement.added), refinements)}"
     return text + pattern
 
 

@@ -131,7 +131,7 @@ class Missing:
             if missing and result.judgement.provisional:
                 words("Provisional: may change when further effects are added.", "quiet small")
             if len(result.missing) > 1 and result.findings.steps and not self.page.discovering:
-                title = f"Discover: add all {len(result.missing)} effects"
+                title = f"Discover: add all {result.missing_count}"
                 button(title, "auto_fix_high", self.page.discover)
             cards = self._show_first(result)
             if len(result.candidates) > FIRST:
