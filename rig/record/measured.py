@@ -21,6 +21,7 @@ from procedures.soak import POWER_ON
 from rig.bench import Sensor
 from rig.errors import RecordError, UnknownRun
 from rig.record import tables
+from rig.record.history import interruptions
 from rig.record.store import Record
 from rig.record.tables import MOST_BLOCKS, inflations, poses_table, samples_table, stated_unit, units_of
 from rig.record.turns import turn_columns
@@ -39,6 +40,7 @@ from rig.record.values import CHANGED, KeptPose, Run
 FIELD, RATE, FORCE = ("mx", "my", "mz"), ("gx", "gy", "gz"), ("ax", "ay", "az")
 POSE_CONSTANTS = ("filter_corner_hz", "approach_deg")  # constants of poses only
 PROGRAM_CHANGED = "program_changed"  # a constant: from where on another program or procedure measured
+INTERRUPTIONS = "interruptions"  # a constant: when, where and why the run was stopped and resumed
 
 
 def positions_table(run: Run, poses: Iterable[KeptPose]) -> Table:
@@ -162,6 +164,8 @@ class MeasuredRun:
         motion = tables.constants(self.run, self.sensor) if KINDS[self.run.kind].moving else {}
         if changes := [event.text for event in self.record.events(self.run.run) if event.what == CHANGED]:
             motion[PROGRAM_CHANGED] = "; ".join(changes)  # also in every export
+        if stops := interruptions(self.record, self.run.run):
+            motion[INTERRUPTIONS] = stops
         if self.sensor is None:
             return {**self.run.constants, **motion}
         sensor = Sensor.model_validate(self.run.bench["sensors"][self.sensor])

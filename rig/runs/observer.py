@@ -24,6 +24,7 @@ from rig.bench import Bench
 from rig.planning.plan import Plan
 from rig.record import KeptPose, Run
 from rig.runs.estimates import Value, live_estimates
+from rig.runs.signals import stop_source
 
 UNUSUAL = 2.0  # ratio to the usual scatter, up or down, above which it is shown
 SCATTER_DWELLS = 200  # dwells of a kind for the usual scatter
@@ -46,10 +47,12 @@ class Outcome:
 class Observer:
     """The observer of a run: a terminal, a page, a test. This one shows nothing and has no person to decide.
 
-    `ignored_when_paused`: signals that do not end the question of `interrupted`.
+    `ignored_when_paused`: signals that do not end the question of `interrupted`. `place`: where a person follows the
+    run, for its record.
     """
 
     ignored_when_paused: Collection[Signals] = ()
+    place = ""
 
     def planned(self, plan: Plan) -> None:
         """The plan of a new run, before it begins. Raises Declined if a person does not want it."""
@@ -84,6 +87,10 @@ class Observer:
     def interrupted(self, outcome: Outcome) -> Decision:  # noqa: ARG002
         """The run is interrupted and the rig is at rest: resume the run, repeat its last pose first, or end it."""
         return "end"
+
+    def stop_source(self, signal_name: str) -> str:
+        """Who stopped the run by this signal."""
+        return stop_source(signal_name)
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,9 @@ from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from typing import Any
 
-from drivers.errors import DriverError, Interlocked, SensorFault
+from drivers.errors import DriverError, SensorFault
 from procedures.catalogue import Procedure, find
-from procedures.errors import Declined, NoAnswer, ProcedureError, SafetyLimit
+from procedures.errors import ProcedureError
 from procedures.questions import Confirm
 from procedures.settings import parse
 from rig.bench import Bench
@@ -31,11 +31,12 @@ from rig.lease import lease
 from rig.planning.plan import plan
 from rig.planning.preparation import first_question
 from rig.record import Record, Run
+from rig.record.history import STOPS
 from rig.record.values import CHANGED
 from rig.results import Result, documents, judge_results, read_returned
 from rig.runs.host import RunHost, leave_as
 from rig.runs.observer import Decision, Observer, Outcome
-from rig.runs.signals import Trace, stop_source, stoppable
+from rig.runs.signals import Trace, stoppable
 
 __all__ = ["REPEATED", "Decision", "Observer", "Outcome", "RunHost", "resume", "start"]
 
@@ -148,7 +149,7 @@ def _after_decision(record: Record, outcome: Outcome, observer: Observer, trace:
         except (DriverError, RigError) as error:  # such as an instrument that still does not answer
             outcome = Outcome(record.run(run), error, outcome.moving)  # nothing has stopped these since
         except KeyboardInterrupt as stop:  # before the run went on
-            outcome = Outcome(record.run(run), _error_of(stop, outcome.run), outcome.moving)
+            outcome = Outcome(record.run(run), _error_of(stop, outcome.run, observer), outcome.moving)
     return outcome
 
 
@@ -175,7 +176,7 @@ def _carry_out(
     def log(event: str, text: str) -> None:
         record.log(run.run, rig.clock.now(), "run", event, text)
 
-    log("begun", f"{procedure.name} at pose {run.rows}")
+    log("begun", ", ".join(filter(None, (f"{procedure.name} at pose {run.rows}", observer.place))))
     _note_program(record, run, procedure, log)
     record.set_state(run.run, "running")
     try:
@@ -185,7 +186,7 @@ def _carry_out(
             (documents(own_results, rig.bench.result_limits), None) if own_results else judge_results(record, run)
         )
     except BaseException as failure:
-        error = _error_of(failure, run)
+        error = _error_of(failure, run, observer)
         log("error", f"{type(error).__name__}: {error}")
         complaints = _stop(rig)
         log("stopped", " ".join(complaints) or "all instruments are at rest")
@@ -227,13 +228,13 @@ def _interrupted_outcome(record: Record, run: Run, error: Exception, complaints:
         return Outcome(replace(run, state=_state(error), message=str(error)), error, tuple(complaints))
 
 
-def _error_of(failure: BaseException, run: Run) -> Exception:
+def _error_of(failure: BaseException, run: Run, observer: Observer) -> Exception:
     """The error that ended a run, with one message."""
     if isinstance(failure, (DriverError, ProcedureError, RigError)):
         return failure
     if isinstance(failure, KeyboardInterrupt):
         signal_name = str(failure) or "SIGINT"
-        return Stopped(f"{stop_source(signal_name)}; `rig resume {run.run}` continues the run", signal_name)
+        return Stopped(f"{observer.stop_source(signal_name)}; `rig resume {run.run}` continues the run", signal_name)
     return RuntimeError(f"{type(failure).__name__}: {failure}")
 
 
@@ -289,7 +290,7 @@ def _stop(rig: Rig) -> list[str]:
 
 
 def _state(error: Exception) -> str:
-    return "stopped" if isinstance(error, (Stopped, SafetyLimit, Interlocked, NoAnswer, Declined)) else "failed"
+    return "stopped" if isinstance(error, STOPS) else "failed"
 
 
 def _as_json(settings: Mapping[str, Any]) -> dict[str, Any]:

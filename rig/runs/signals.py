@@ -16,9 +16,10 @@ if TYPE_CHECKING:
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 SIGNAL_SOURCES = {
     "SIGINT": "stopped by a person (SIGINT)",
-    "SIGTERM": "stopped by the page Run or by another program (SIGTERM)",
+    "SIGTERM": "stopped by another program (SIGTERM)",
     "SIGHUP": "stopped because its terminal was closed (SIGHUP)",
 }
+ON_A_PAGE = "stopped on a page of the workbench"  # also by SIGINT or SIGTERM, with a mark beside the status file
 COMPILED_PACKAGE = "drivers.world"  # its compiled code calls Python generators; an exception there would break it
 # Between bytes and their count: the simulated clock would wait for bytes that have come already.
 COUNTERS = (("drivers.clock", "step"), ("drivers.transport.link", "put"), ("drivers.transport.link", "take"))

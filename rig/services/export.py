@@ -10,7 +10,8 @@ There is no Parquet and no HDF5: each needs a large dependency for one table, an
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,8 @@ from calibrations.importing.foreign import write_csv
 from calibrations.table import Table
 from rig.errors import ExportError
 from rig.files import draft_of, require_out
-from rig.record import Record, Run
+from rig.record import Event, Record, Run
+from rig.record.history import history
 from rig.record.measured import table_of
 from rig.services.tables import load
 
@@ -66,14 +68,17 @@ def _write_events(data: str, path: Path) -> int:
         raise ExportError(f"{data} is a file; give the id of a run, because event-model documents describe a run")
     with Record.to_read() as record:
         run = record.run(data)
-        table = table_of(record, run.run)
-    lines = [json.dumps({"name": name, "doc": document}) for name, document in documents(run, table)]
+        table, events = table_of(record, run.run), history(record, run.run)
+    lines = [json.dumps({"name": name, "doc": document}) for name, document in documents(run, table, events)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return table.n
 
 
-def documents(run: Run, table: Table) -> Iterator[tuple[str, dict[str, Any]]]:
-    """The run as event-model documents, (name, document). Their ids are derived from the id of the run."""
+def documents(run: Run, table: Table, events: Sequence[Event]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The run as event-model documents, (name, document). Their ids are derived from the id of the run.
+
+    `events`: the history of the run, for the document of its end.
+    """
     start, descriptor = _uid(run.run, "start"), _uid(run.run, "descriptor")
     began = datetime.fromisoformat(run.created).timestamp()
     end_s = datetime.fromisoformat(run.ended).timestamp() if run.ended else began
@@ -106,7 +111,8 @@ def documents(run: Run, table: Table) -> Iterator[tuple[str, dict[str, Any]]]:
         )
     status = {"complete": "success", "stopped": "abort", "running": "abort"}.get(run.state, "fail")
     end = {"uid": _uid(run.run, "stop"), "run_start": start, "time": end_s, "exit_status": status}
-    yield "stop", {**end, "reason": run.message or "", "num_events": {"primary": table.n}}
+    end |= {"reason": run.message or "", "num_events": {"primary": table.n}}
+    yield "stop", {**end, "history": [asdict(event) for event in events]}
 
 
 def _key(name: str, run: Run, table: Table) -> dict[str, Any]:

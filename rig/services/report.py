@@ -12,7 +12,7 @@ from calibrations.discovery.verdict import Verdict
 from calibrations.errors import UnusableData
 from rig.files import program
 from rig.record import Record
-from rig.record.measured import MeasuredRun
+from rig.record.measured import INTERRUPTIONS, MeasuredRun
 from rig.results.samples import compare_with_displacement
 from rig.services.load import AnalysisInput, load_request
 from rig.services.next_experiment import planned
@@ -74,6 +74,7 @@ def _facts(measured: MeasuredRun, date: str, program: str) -> Mapping[str, str]:
         "run": f"{measured.name}, {run.state}",
         "begun": run.created,
         "ended": run.ended or "–",
+        INTERRUPTIONS: str(measured.constants.get(INTERRUPTIONS, "none")),
         "settings": ", ".join(f"{name} {value}" for name, value in run.settings.items()),
         **run.instruments,
         "program": program,

@@ -93,7 +93,7 @@ def test_a_run_is_paused_left_alone_opened_again_and_stopped(workbench: Workbenc
     phase(page, "running")
     page.get_by_role("button", name="Stop").first.click()
     phase(page, "stopped")
-    expect(page.get_by_text("Stopped by a person. Resume continues at the same pose.")).to_be_visible()
+    expect(page.get_by_text("Stopped on a page of the workbench. Resume continues at the same pose.")).to_be_visible()
     expect(page.get_by_role("button", name="Resume")).to_be_visible()
     expect(page.get_by_role("button", name="Stop")).to_have_count(0)
     with Record() as record:
@@ -111,7 +111,7 @@ def test_a_run_of_a_terminal_is_watched_and_stopped(workbench: Workbench) -> Non
         expect(page.get_by_role("button", name="Pause")).to_have_count(0)
         page.get_by_role("button", name="Stop").first.click()
         phase(page, "stopped")
-        assert "stopped by the page Run or by another program (SIGTERM)" in terminal.communicate(timeout=60)[1]
+        assert "stopped on a page of the workbench" in terminal.communicate(timeout=60)[1]
     assert terminal.returncode == 4
 
 

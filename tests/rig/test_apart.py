@@ -23,6 +23,7 @@ from rig.files import home
 from rig.instruments.instruments import connect_all
 from rig.lease import lease
 from rig.record import KeptPose, Record
+from rig.record.history import history
 from rig.runs.background import control, process
 from rig.runs.background import status as status_file
 from rig.runs.background.control import PublishingObserver
@@ -35,6 +36,7 @@ from rig.runs.background.status import (
     folder,
     keys,
     lock,
+    mark_stop,
 )
 from rig.runs.runner import Outcome, start
 from tests.rig.rigging import POSES, SMALL
@@ -109,7 +111,11 @@ def test_paused_and_gone_on_and_stopped() -> None:
 
     status = carried_out("soak", {"duration_s": "43200"}, person)
     assert (status.phase, status.state) == ("ended", "stopped")
-    assert "stopped by " in status.error
+    assert status.error == f"stopped on a page of the workbench; `rig resume {status.run}` continues the run"
+    with Record() as record:
+        turns = [(event.what, event.text.partition(";")[0]) for event in history(record, status.run)]
+    assert turns[0] == ("begun", "soak at pose 0, on a page of the workbench")
+    assert ("stopped", "on a page of the workbench") in turns
 
 
 def test_a_second_pause_changes_nothing() -> None:
@@ -120,8 +126,7 @@ def test_a_second_pause_changes_nothing() -> None:
         control.stop(when("running"))
 
     status = carried_out("soak", {"duration_s": "43200"}, person)
-    # which signal is named depends on whether the run has begun again when the stop comes
-    assert "stopped by " in status.error
+    assert "stopped on a page of the workbench" in status.error
 
 
 def test_many_wishes_for_a_pause_are_one_pause() -> None:
@@ -138,7 +143,7 @@ def test_many_wishes_for_a_pause_are_one_pause() -> None:
         control.stop(when("running", lambda status: status.done > done))
 
     assert carried_out("soak", {"duration_s": "43200"}, person).error.startswith(
-        "stopped by the page Run or by another program"
+        "stopped on a page of the workbench"
     )
 
 
@@ -249,7 +254,30 @@ def test_a_run_of_a_terminal_is_stopped_from_elsewhere() -> None:
     ended = control.latest()
     assert ended is not None
     assert (ended.phase, ended.state) == ("ended", "stopped")
-    assert "stopped by the page Run or by another program (SIGTERM)" in ended.error
+    assert "stopped on a page of the workbench" in ended.error
+    assert not file(ended.key, "stop").exists()
+
+
+def test_a_signal_of_another_program_is_not_taken_for_a_stop_on_a_page() -> None:
+    """Not even after the mark of a pause that the run did not hear."""
+
+    def person() -> None:
+        running = when("running")
+        mark_stop(running.key, "SIGINT")
+        os.kill(running.pid, signal.SIGTERM)
+
+    status = carried_out("soak", {"duration_s": "43200"}, person)
+    assert status.error == f"stopped by another program (SIGTERM); `rig resume {status.run}` continues the run"
+    assert not file(status.key, "stop").exists()
+
+
+def test_a_mark_that_cannot_be_written_does_not_prevent_a_stop_on_a_page() -> None:
+    def person() -> None:
+        running = when("running")
+        file(running.key, "stop").mkdir()
+        control.stop(running)
+
+    assert carried_out("soak", {"duration_s": "43200"}, person).state == "stopped"
 
 
 def test_what_a_terminal_asks_is_answered_there() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -55,8 +56,10 @@ def test_a_run_tells_what_it_did_what_stopped_it_and_that_it_went_on(rig: Callab
     assert {line.who for line in lines} == {"run"}, "messages are logged on request"
     told = [line[23:] for line in rig("show", run.run).out.splitlines() if line.startswith("  20")]
     assert [line.partition(":")[0] for line in told if not line.startswith("answer")] == [
-        "begun", "error", "stopped", "begun", "complete"
+        "begun", "failed", "resumed", "complete"
     ]  # fmt: skip
+    assert told[-2].endswith(f"resumed: sweep at pose {kept}")
+    assert re.search("failed: alpha: has stopped with alarm 30.*; all instruments are at rest$", told[-3])
 
 
 @pytest.mark.sockets

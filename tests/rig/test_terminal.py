@@ -138,7 +138,7 @@ def test_sigterm_ends_a_guided_run_without_a_menu() -> None:
     with begun(*LONG) as terminal:
         terminal.expect(UNDER_WAY)
         terminal.kill(signal.SIGTERM)
-        terminal.expect("stopped by the page Run or by another program")
+        terminal.expect("stopped by another program")
         terminal.expect(pexpect.EOF)
         assert NEXT_STEP.text not in (terminal.before or "")
     assert terminal.exitstatus == 4

@@ -18,11 +18,11 @@ from rig.cli.terminal.progress import working
 from rig.errors import RecordError
 from rig.record import Event, KeptPose, Line, Record, Run
 from rig.record.codec import digest_of
+from rig.record.history import history
 from rig.record.measured import MeasuredRun
 from rig.record.tables import units_of
 from rig.services.next_steps import next_steps, results_table
 
-TURNS = ("begun", "error", "stopped", "complete")  # of a run's log: its beginnings and its ends
 Ranges = Mapping[str, tuple[float, float]]
 
 
@@ -39,8 +39,7 @@ def show_command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
         run_row = record.run(run)
         run = run_row.run
         left_out = record.excluded(run)
-        turns = [Event(line.at, line.what, line.text) for line in record.lines(run, TURNS)]
-        events = sorted([*record.events(run), *turns], key=lambda event: event.at)
+        events = history(record, run)
         ranges = _ranges(record, run_row)
         listed = _poses(record, run_row) if poses else None
         lines = record.lines(run) if wants_log else []
@@ -54,12 +53,11 @@ def show_command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
             f"The record has {count} runs of the sensor {name}: rig history {name}"
             for name, count in run_counts.items()
         ]
-        history = [_event(event, run_row.message) for event in events]
         parts = (
             _head(run_row),
             result_lines,
             _columns(ranges),
-            history,
+            [_event(event, run_row.message) for event in events],
             _tabulate_poses(listed or []),
             _iterate_log(lines),
         )

@@ -35,6 +35,8 @@ FRAMES_HZ = 8
 class Guide(RunViewer):
     """Shows a run on standard error while it runs."""
 
+    place = "in a terminal"
+
     def __init__(
         self, procedure: Procedure, bench: Bench, answers: Mapping[str, str], console: Console | None = None
     ) -> None:

@@ -34,6 +34,8 @@ class Quiet(Observer):
     the result so far after every path.
     """
 
+    place = "unattended"
+
     def __init__(self, answers: Mapping[str, str], procedure: str = "") -> None:
         self._answers, self._estimates = answers, live_estimates(procedure) if procedure else None
 

@@ -34,10 +34,12 @@ from rig.runs.background.status import (
     folder,
     keys,
     lock,
+    mark_stop,
     new_key,
     open_question,
     read,
     remove_old_files,
+    stop_source_of,
 )
 from rig.runs.observer import Decision, Observer, Outcome
 
@@ -51,7 +53,7 @@ class PublishingObserver(Observer):
     """
 
     def __init__(self, observer: Observer, procedure: str, bench: Bench, seat: Seat) -> None:
-        self._observer, self._procedure = observer, procedure
+        self._observer, self._procedure, self.place = observer, procedure, observer.place
         self._key, self._run = new_key(), ""
         self._writer = StatusWriter(self._key, procedure, bench, seat)
         self._held = ExitStack()
@@ -110,6 +112,9 @@ class PublishingObserver(Observer):
     def interrupted(self, outcome: Outcome) -> Decision:
         self._publish(self._writer.publish, phase="paused", error=str(outcome.error), moving=outcome.moving)
         return self._observer.interrupted(outcome)
+
+    def stop_source(self, signal_name: str) -> str:
+        return stop_source_of(self._key, signal_name)
 
     def _publish(self, event: Callable[P, None], *args: P.args, **kwargs: P.kwargs) -> None:
         if self._run:
@@ -218,5 +223,6 @@ def answer(status: Status, text: str) -> None:
 
 def _signal(status: Status, number: signal.Signals) -> None:
     if status.phase != "ended":
+        mark_stop(status.key, number.name)
         with suppress(ProcessLookupError):
             os.kill(status.pid, number)

@@ -25,7 +25,6 @@ from rig.record.push import push_after
 from rig.runs.background.status import Order, StatusWriter, file, lock, open_question
 from rig.runs.observer import NEXT_STEP
 from rig.runs.runner import Decision, Outcome, resume, start
-from rig.runs.signals import stop_source
 
 PAUSE = signal.SIGINT  # by which a page pauses a run
 LONGEST = 4096  # bytes of an answer, which a pipe hands over in one piece
@@ -35,6 +34,7 @@ class Attendant(StatusWriter):
     """The observer of a background run, which asks through a pipe. A second request for a pause changes nothing."""
 
     ignored_when_paused = (PAUSE,)
+    place = "on a page of the workbench"
 
     def __init__(self, order: Order, bench: Bench) -> None:
         super().__init__(order.key, order.procedure, bench)
@@ -99,7 +99,7 @@ def main(text: str) -> None:
         try:
             outcome = _carry_out(order, record, writer)
         except KeyboardInterrupt as stop:  # before the run began, or between its parts
-            writer.publish(phase="ended", state="stopped", asked=None, error=stop_source(str(stop)))
+            writer.publish(phase="ended", state="stopped", asked=None, error=writer.stop_source(str(stop)))
             return
         except Exception as error:
             writer.publish(phase="ended", state="failed", asked=None, error=str(error))

@@ -22,6 +22,7 @@ from rig.files import free_bytes, home, write_whole
 from rig.lease import is_held
 from rig.record import Record, Run
 from rig.runs.observer import RunViewer, values
+from rig.runs.signals import ON_A_PAGE, stop_source
 
 FOLDER = "apart"
 KEY_TIME = "%Y%m%d-%H%M%S-%f"  # of the begin of a process, UTC
@@ -75,6 +76,26 @@ def new_key() -> str:
 def file(key: str, ending: str) -> Path:
     """One of the files of a process."""
     return home() / FOLDER / f"{key}.{ending}"
+
+
+# The mark of a stop on a page: a file that is written before the signal, with the name of the signal.
+
+
+def mark_stop(key: str, signal_name: str) -> None:
+    """Mark that a page sends this signal. A full disk must not prevent the stop: then there is no mark."""
+    with suppress(RigError, OSError):
+        write_whole(file(key, "stop"), signal_name)
+
+
+def stop_source_of(key: str, signal_name: str) -> str:
+    """Who stopped the process `key` by this signal. Removes the mark of a page."""
+    mark = file(key, "stop")
+    try:
+        is_marked = mark.read_text(encoding="utf-8") == (signal_name or "SIGINT")
+        mark.unlink()
+    except OSError:
+        return stop_source(signal_name)
+    return ON_A_PAGE if is_marked else stop_source(signal_name)
 
 
 # The status of a background run, as one small file.
@@ -209,7 +230,7 @@ def remove_old_files() -> None:
     """Remove the files of old processes, except the last KEPT. Their runs stay in the record."""
     for key in keys()[:-KEPT_ESTIMATES]:
         if not is_held(home(), lock(key)):
-            for ending in ("answers", "log", "json"):
+            for ending in ("answers", "log", "stop", "json"):
                 file(key, ending).unlink(missing_ok=True)
 
 
@@ -264,6 +285,9 @@ class StatusWriter(RunViewer):
         recorded_poses = _count_stored(run, self.view.progress.done, self.view.progress.total)
         self.view = replace(self.view, progress=replace(self.view.progress, done=recorded_poses))
         self.publish(phase="ended", state=run.state, asked=None, error=error, **changes)
+
+    def stop_source(self, signal_name: str) -> str:
+        return stop_source_of(self._status.key, signal_name)
 
     def begun(self, run: str) -> None:
         super().begun(run)

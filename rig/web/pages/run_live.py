@@ -12,11 +12,12 @@ from typing import Any
 
 from nicegui import ui
 
+from calibrations.text import capital
 from procedures.session import Guidance
 from rig.drawings import Attitude, orientation_drawing, page, strip
 from rig.runs.background import control
 from rig.runs.background.status import NOT_BEGUN, OpenQuestion, Status
-from rig.runs.signals import SIGNAL_SOURCES
+from rig.runs.signals import ON_A_PAGE, SIGNAL_SOURCES
 from rig.web.address import ModelState
 from rig.web.calculations import off_loop
 from rig.web.frame import control_run
@@ -36,7 +37,7 @@ SEATS = {
     "terminal": "This run was started in a terminal. Pause stops the motion; the terminal then asks how to continue.",
     "nobody": "This run is unattended and cannot pause. Stop ends it; you can resume it later.",
 }
-STOPPED = "Stopped by a person. Resume continues at the same pose."
+GOES_ON = "Resume continues at the same pose."
 STOPPED_EARLY = "Stopped before the run began."
 RESUME = re.compile(r"`rig resume[^`]*`")  # a button of this page does it
 TONE = """(() => {
@@ -267,12 +268,13 @@ def _tile(value: Mapping[str, Any]) -> None:
 
 
 def stop_words(status: Status) -> str:
-    """The words for a run that a person stopped, which is no error; "" for another run."""
+    """The words for a run that was stopped by a signal, which is no error; "" for another run."""
     if status.state != "stopped":
         return ""
     if not status.run and status.error.endswith(NOT_BEGUN):
         return STOPPED_EARLY
-    return STOPPED if status.error.startswith(tuple(SIGNAL_SOURCES.values())) else ""
+    source = next((words for words in (ON_A_PAGE, *SIGNAL_SOURCES.values()) if status.error.startswith(words)), "")
+    return f"{capital(source)}. {GOES_ON}" if source else ""
 
 
 def _drawing(attitude: Mapping[str, Any]) -> str:

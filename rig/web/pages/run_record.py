@@ -16,6 +16,7 @@ from procedures.settings import setting_text
 from rig.bench.result_names import meaning
 from rig.errors import RecordError
 from rig.record import Event, Record, Run
+from rig.record.history import history
 from rig.record.tables import units_of
 from rig.services.charts import Course, RunTime, course_chart, kind_of
 from rig.services.exclusion import exclude, find_numbered_run
@@ -302,7 +303,7 @@ class OneRun:
 
     def _show_events(self) -> None:
         with Record.to_read() as record:
-            events = record.events(self.run.run)
+            events = history(record, self.run.run)
         with afresh(self.events):
             if events:
                 table(("time (UTC)", "event", ""), [_event(event) for event in events])

@@ -1,0 +1,88 @@
+"""The history of a run: when and where it began, was stopped and went on, in the record, exports and reports."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from rig.bench import read_bench
+from rig.record import Line, Record
+from rig.record.history import _turns, history
+from rig.record.measured import INTERRUPTIONS, table_of
+from rig.runs.runner import resume, start
+from tests.rig.rigging import Onlooker, sigterm_at, small_sweep
+
+
+class InATerminal(Onlooker):
+    """One who looks on in a terminal."""
+
+    place = "in a terminal"
+
+
+def lines(*kinds: tuple[str, str]) -> list[Line]:
+    return [Line(f"2026-11-29T12:00:0{k}", 0.0, "run", what, text) for k, (what, text) in enumerate(kinds)]
+
+
+def test_a_stopped_and_resumed_run_says_so_in_its_events_table_and_export(
+    rig: Callable[..., Any], tmp_path: Path
+) -> None:
+    with Record() as record:
+        with sigterm_at(4):
+            run = start(record, read_bench(), *small_sweep(), InATerminal()).run
+        resume(record, run.run, Onlooker())
+        events = [(event.what, event.text) for event in history(record, run.run)]
+        constants = table_of(record, run.run).constants
+    stop = "by another program (SIGTERM); all instruments are at rest"
+    assert [event for event in events if not event[0].startswith("answer")] == [
+        ("begun", "sweep at pose 0, in a terminal"),
+        ("stopped", stop),
+        ("resumed", f"sweep at pose {run.rows}"),
+        ("complete", ""),
+    ]
+    told = str(constants[INTERRUPTIONS])
+    assert [part.partition(" ")[2] for part in told.split("; 2")] == [
+        f"stopped {stop}",
+        f"resumed sweep at pose {run.rows}",
+    ]
+    rig("export", run.run, "--format", "event-model", "--out", tmp_path / "run.jsonl")
+    end = json.loads((tmp_path / "run.jsonl").read_text().splitlines()[-1])["doc"]
+    assert [event["what"] for event in end["history"] if not event["what"].startswith("answer")] == [
+        "begun", "stopped", "resumed", "complete"
+    ]  # fmt: skip
+    rig("export", run.run, "--format", "csv", "--out", tmp_path / "run.csv")
+    assert f"# {INTERRUPTIONS}: {told}" in (tmp_path / "run.csv").read_text().splitlines()
+
+
+def test_an_undisturbed_run_has_no_interruptions() -> None:
+    with Record() as record:
+        run = start(record, read_bench(), *small_sweep(), Onlooker()).run
+        assert INTERRUPTIONS not in table_of(record, run.run).constants
+
+
+def test_a_part_that_was_killed_is_named_where_the_run_goes_on() -> None:
+    killed = _turns(lines(("begun", "sweep at pose 0"), ("begun", "sweep at pose 3"), ("complete", "")))
+    assert [(turn.what, turn.text) for turn in killed] == [
+        ("begun", "sweep at pose 0"),
+        ("resumed", "sweep at pose 3; the part before it was killed"),
+        ("complete", ""),
+    ]
+
+
+def test_the_log_of_an_older_program_has_a_history_too() -> None:
+    older = _turns(
+        lines(
+            ("begun", "sweep at pose 0"),
+            ("error", "Stopped: stopped by SIGTERM"),
+            ("stopped", "all instruments are at rest"),
+            ("begun", "sweep at pose 3"),
+            ("error", "an error without a name"),
+        )
+    )
+    assert [(turn.what, turn.text) for turn in older] == [
+        ("begun", "sweep at pose 0"),
+        ("stopped", "by SIGTERM; all instruments are at rest"),
+        ("resumed", "sweep at pose 3"),
+        ("failed", "an error without a name"),
+    ]
