@@ -106,7 +106,6 @@ class Commands(click.Group):
 
 
 NEW_OBJECTS = 50_000  # between two collections of garbage: imports make many objects, and none of them is garbage
-LAST = "last"  # the newest run
 COMPLETE = "_RIG_COMPLETE"  # set by the completion script of a shell
 
 
@@ -122,6 +121,8 @@ def rig() -> None:
 
 def last_joined(arguments: Sequence[str]) -> list[str]:
     """Join `last` and the name of a procedure after it to one word, so that a person need not type quotes."""
+    from rig.cli.terminal.complete import LAST
+
     words = list(arguments)
     if LAST in words[:-1]:
         from procedures.catalogue import paths
@@ -142,9 +143,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     gc.set_threshold(NEW_OBJECTS)
 
     if instruction := os.environ.get(COMPLETE):  # the shell asks what may follow
-        from click.shell_completion import shell_complete
+        from rig.cli.terminal.complete import answer_shell
 
-        raise SystemExit(shell_complete(rig, {}, "rig", COMPLETE, instruction))
+        raise SystemExit(answer_shell(rig, "rig", COMPLETE, instruction))
 
     def call() -> Any:
         words = last_joined(sys.argv[1:] if arguments is None else arguments)

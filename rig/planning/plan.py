@@ -159,6 +159,15 @@ class Plan:
         """Number of recorded poses."""
         return len(self.held)
 
+    def after(self, recorded_poses: int) -> Plan:
+        """The rest of the plan after its first poses, with its duration and storage."""
+        if not recorded_poses:
+            return self
+        remaining = self.held[recorded_poses:]
+        begin_s = remaining[0].start_s if remaining else self.duration_s
+        share = len(remaining) / self.poses if self.poses else 1.0
+        return replace(self, held=remaining, duration_s=self.duration_s - begin_s, bytes=round(self.bytes * share))
+
     @property
     def questions(self) -> tuple[str, ...]:
         """The questions to a person with their names."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 from calibrations.errors import MissingColumn
 from calibrations.importing.binary import open_sheet
 from calibrations.importing.cells import SHARES, Policy
-from calibrations.importing.foreign import import_sheet, needs_mapping
+from calibrations.importing.foreign import complete_mapping, import_sheet, needs_mapping
 from calibrations.importing.plausible import Doubt
 from calibrations.importing.proposal import (
     column_names,
@@ -27,7 +28,19 @@ from calibrations.table import AXES, NUMBERS, Constant, Table, guess_kind
 from rig.record import Record
 from rig.services.tables import average_log
 
+QUANTITIES = {
+    "alpha_deg": "the angle alpha",
+    "beta_deg": "the angle beta",
+    "rate_deg_s": "the turning rate",
+    "t_s": "the time",
+    "displacement_m": "the displacement",
+    "turn": "the number of the turn",
+    "resting": "the rests",
+    "path": "the section",
+}
+SENSORS = {"v": "output", "a": "specific force", "m": "magnetic field", "g": "turning rate"}  # by the first letter
 MOST_DRAWN = 4000
+TIMES = ("s", "min", "h", "ms")  # units of a time in doubt, for a person
 COLOURS = (MEASURED, CANDIDATE, QUIET)
 OUTPUT_UNITS = {
     "a": ("g", "mg", "m/s2", "counts"),
@@ -66,14 +79,32 @@ def needs_person(sheet: Sheet) -> bool:
     return needs_mapping(sheet, None, ()) or time_doubt(sheet, _known_columns(sheet)) is not None
 
 
-def proposal(sheet: Sheet, kind: str | None = None) -> Proposal:
-    """The proposed mapping of a sheet, as `kind` or as the likely one."""
-    mapping = _known_columns(sheet)
+def proposal(sheet: Sheet, kind: str | None = None, mapped: Sequence[ColumnMapping] = ()) -> Proposal:
+    """The proposed mapping of a sheet, as `kind` or as the likely one. `mapped`: columns that a person has named."""
+    mapping = named_columns(sheet, mapped)
     kind = kind or _kind(sheet, mapping)
     target_names = column_names(kind)
     proposed = propose_mapping(sheet, "poses" if kind == "still" else kind, mapping)
     mappings = {m.file_column: m for m in proposed if m.name in target_names or m in mapping}
     return Proposal(kind, {name: mappings.get(name) for name in sheet.header})
+
+
+def further_columns(sheet: Sheet, kind: str | None, mapped: Sequence[ColumnMapping]) -> list[ColumnMapping]:
+    """The proposals of the page Import for the columns that neither a person nor their names in the file explain.
+
+    No outputs beside `mapped` columns: who names the outputs of one sensor leaves those of another.
+    """
+    named = {m.file_column for m in (*mapped, *named_columns(sheet, mapped))}
+    proposed = proposal(sheet, kind, mapped).columns.values()
+    further = [m for m in proposed if m is not None and m.file_column not in named]
+    return [m for m in further if not (mapped and _output_axis(m.name))]
+
+
+def named_columns(sheet: Sheet, mapped: Sequence[ColumnMapping] = ()) -> list[ColumnMapping]:
+    """The columns that a person has named, and those that have our names already. Raises DataError."""
+    by_person = complete_mapping(sheet, mapped)
+    names = {name for m in by_person for name in (m.name, m.file_column)}
+    return [*by_person, *(m for m in _known_columns(sheet) if names.isdisjoint((m.name, m.file_column)))]
 
 
 def doubt_of_time(sheet: Sheet, columns: Sequence[ColumnMapping]) -> Doubt | None:
@@ -95,6 +126,15 @@ def units_for(name: str) -> list[str]:
 def lacking(sheet: Sheet, kind: str, columns: Sequence[ColumnMapping]) -> list[str]:
     """The columns that the import still needs."""
     return missing_columns(kind, sheet, columns) if kind != "still" else [] if _outputs(columns) else ["vx_v"]
+
+
+def column_words(name: str) -> str:
+    """A column that an import needs, in words: `the column of the angle alpha (alpha_deg)`."""
+    if name in QUANTITIES:
+        return f"the column of {QUANTITIES[name]} ({name})"
+    if axis := _output_axis(name):
+        return f"the column of the {SENSORS[name[0]]} along {axis} ({name})"
+    return f"the column {name}"
 
 
 def preview(sheet: Sheet, kind: str, columns: Sequence[ColumnMapping], constants: Mapping[str, Constant]) -> Preview:
@@ -155,6 +195,11 @@ def _kind(sheet: Sheet, own_columns: Sequence[ColumnMapping]) -> str:
 def _header_unit(sheet: Sheet, column: str) -> str:
     """The unit of a column in the file's header."""
     return sheet.units[sheet.header.index(column)]
+
+
+def _output_axis(name: str) -> str:
+    """The axis of an output of a sensor; "" for another column."""
+    return name[1] if re.fullmatch(r"v[xyz]_v|[amg][xyz]", name) else ""
 
 
 def _outputs(columns: Sequence[ColumnMapping]) -> bool:

@@ -252,17 +252,22 @@ def model_session(request: Request) -> ModelSession[Any]:
     )
 
 
-def brought_up_to_date(old: ModelSession[Any], new: ModelSession[Any]) -> ModelSession[Any]:
-    """The added effects of an old session on `new`, the present data without effects. A note names the change.
+CHANGED = "The data or the model have changed since this page was last open: "
 
-    An effect that the present data cannot have is left out, with a note.
+
+def brought_up_to_date(old: ModelSession[Any], new: ModelSession[Any], is_shown: bool = False) -> ModelSession[Any]:
+    """The added effects of an old session on `new`, the present data without effects.
+
+    A note names the change, unless its page has shown it already (`is_shown`). An effect that the present data cannot
+    have is left out, with a note.
     """
     extent_before, extent_now = old.content.extent, new.content.extent
-    notes = [
-        (
-            "The data or the model have changed since this page was last open: "
-            f"{extent_before or 'a file'}, now {extent_now or 'new'}."
-        )
-    ]
+    notes = [] if is_shown else [f"{CHANGED}{extent_before or 'a file'}, now {extent_now or 'new'}."]
     new = new.with_effects({**old.effects, **new.effects}).with_added(old.added)
     return replace(new, notes=(*notes, *new.notes))
+
+
+def without_change(session: ModelSession[F]) -> ModelSession[F]:
+    """The session without the note on a change of its data or model."""
+    notes = tuple(note for note in session.notes if not note.startswith(CHANGED))
+    return session if notes == session.notes else replace(session, notes=notes)

@@ -36,7 +36,8 @@ class Desk:
 
     `dark`: None follows the browser. `sessions`: the open model sessions by data, model and noise model, in order of
     use. `beginnings`: the same without added effects, with the searches that pages and reports share. `reports`: HTML
-    by the content of the data. `second_core` draws pictures of reports.
+    by the content of the data. `second_core` draws pictures of reports. `updates`: the sessions whose change of data or
+    model a page has shown, with a click on Update.
     """
 
     bench_file: Path | None
@@ -46,6 +47,7 @@ class Desk:
     beginnings: OrderedDict[tuple[str, str, str], ModelSession[Any]] = field(default_factory=OrderedDict)
     reports: OrderedDict[str, str] = field(default_factory=OrderedDict)
     second_core: SecondCore = field(default_factory=SecondCore)
+    updates: set[tuple[str, str, str]] = field(default_factory=set)
 
     def open(
         self, data: str, model: str, added_effects: Sequence[str] | None = None, noise: str = ""
@@ -65,15 +67,19 @@ class Desk:
             if added_effects is None:
                 session = session.with_added(saved_effects(data, model, noise))
         elif session.content.key != content_of(data, model or None).key:
-            session = brought_up_to_date(session, self.beginning(data, model, noise))
+            is_shown = (data, model, noise) in self.updates
+            session = brought_up_to_date(session, self.beginning(data, model, noise), is_shown)
+        self.updates.discard((data, model, noise))
         if added_effects is not None:
             session = session.with_added(added_effects)
         self.keep(data, model, session, noise)
         return session
 
     def keep(self, data: str, model: str, session: ModelSession[Any], noise: str = "") -> None:
-        """Store the present state of a session."""
-        self.sessions[data, model, noise] = session
+        """Store the present state of a session, without the note on a change that its page has shown."""
+        from rig.services.session import without_change
+
+        self.sessions[data, model, noise] = without_change(session)
         self.sessions.move_to_end((data, model, noise))
         while len(self.sessions) > MOST_OPEN:
             self.sessions.popitem(last=False)

@@ -148,7 +148,7 @@ def stop_run() -> None:
     status = control.latest()
     if status is not None and status.phase != "ended":
         control_run(control.stop)
-        ui.notify(f"{status.procedure}: stop", type="warning")
+        ui.notify(f"Stopping {status.procedure}", type="warning")
 
 
 STATIC = Path(__file__).parent / "static"

@@ -33,8 +33,8 @@ from rig.web.pages import register
 
 LOST = {  # the message of a page whose server does not answer
     "connection_lost": "The workbench does not answer. Buttons and keys have no effect.",
-    "trying_to_reconnect": "A run continues; to stop the rig now, use its emergency stop. This page connects again by "
-    "itself. If it does not, start the workbench again.",
+    "trying_to_reconnect": "If a run is in progress, it continues: use the emergency stop of the rig to stop it now. "
+    "This page connects again by itself. If it does not, start the workbench again.",
 }
 RETURN_S = 20.0  # a browser that lost the connection may come back so long; its analyses go on
 LEFT = 1001  # the code with which a browser closes the connection of a page that it leaves (RFC 6455, 7.4.1)

@@ -17,6 +17,8 @@ from tests.calibrations.test_turn_logs import log as turn_log
 
 pytestmark = pytest.mark.slow
 
+STILL_NEEDED = 'Still needed: the column of the angle beta (beta_deg). Select it under "meaning".'
+
 
 def foreign(folder: Path, clock: str = "Takt") -> Path:
     """125 poses in 12.4 minutes, outputs in mV, with names of another laboratory."""
@@ -67,10 +69,10 @@ def test_a_file_is_imported_by_drop_downs(workbench: Workbench, tmp_path: Path) 
     choose(page, "unit of Ux", "mV")
     expect(button).to_be_enabled()
     choose(page, "meaning of table", "other")
-    expect(page.get_by_text("Still needed: beta_deg")).to_be_visible()
+    expect(page.get_by_text(STILL_NEEDED)).to_be_visible()
     expect(page).to_have_url(re.compile("column=table&meaning=&unit=$"))
     page.reload()
-    expect(page.get_by_text("Still needed: beta_deg")).to_be_visible()
+    expect(page.get_by_text(STILL_NEEDED)).to_be_visible()
     expect(page.get_by_label("meaning of table", exact=True)).to_have_value("other")
     choose(page, "meaning of table", "beta_deg")
     page.get_by_label("Serial number").fill("17")

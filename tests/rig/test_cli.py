@@ -165,6 +165,12 @@ def test_runs_sensors_and_files_are_completed(
         monkeypatch.setenv("COMP_WORDS", f"rig {line}")
         monkeypatch.setenv("COMP_CWORD", "2")
         assert completed(capsysbinary).split() == offered
+    for line, number, first in (("rig show ", 2, "plain,last"), ("rig fit last ", 3, "plain,sweep")):
+        monkeypatch.setenv("COMP_WORDS", line)
+        monkeypatch.setenv("COMP_CWORD", str(number))
+        assert completed(capsysbinary).split()[0] == first
+    monkeypatch.setenv("COMP_WORDS", "rig show last so")  # there is no soak yet
+    assert completed(capsysbinary).split() == []
 
 
 def test_commands_and_procedures_are_completed(

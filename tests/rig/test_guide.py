@@ -32,7 +32,7 @@ from rig.record import KeptPose, Record
 from rig.runs.estimates import nearness
 from rig.runs.observer import Progress, RunView
 from rig.runs.runner import Outcome
-from rig.web.pages.run_begin import plan_facts
+from rig.web.pages.run_begin import before_resume, before_start, plan_facts
 from tests.rig.rigging import POSES, small_sweep
 
 TODAY = date(2026, 11, 21)
@@ -116,6 +116,25 @@ def test_a_disk_that_is_too_small_is_said() -> None:
 def test_the_page_says_it_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rig.web.pages.run_begin.free_bytes", lambda _: 1000)
     assert plan_facts(planned(), read_bench())["Stores"].endswith("on the disk; 1.0 kB are free: not enough space")
+
+
+def test_the_page_shows_before_a_resume_what_remains_with_the_same_limits() -> None:
+    bench, whole = read_bench(), planned()
+    with Record() as record:
+        name = record.begin("sweep", {}, bench={}, identities={}, configuration="", source="a test", constants={})
+        run = replace(record.run(name), rows=whole.poses // 2)
+    begin, resumed = before_start(whole, bench), before_resume(run, whole, bench, Attitude(flip=1))
+    assert resumed.facts["Recorded"] == f"{run.rows} of {whole.poses} poses"
+    assert resumed.facts["Stores"].startswith(f"{whole.poses - run.rows} poses, ")
+    assert resumed.facts["Takes"] != begin.facts["Takes"]
+    assert resumed.facts["Takes"].endswith(f"the whole run {begin.facts['Takes'].partition(',')[0]}")
+    assert {name: resumed.facts[name] for name in ("Turns alpha", "Turns beta", "Stops")} == {
+        name: begin.facts[name] for name in ("Turns alpha", "Turns beta", "Stops")
+    }
+    assert resumed.facts["Sensor"] == "ADXL203 simulated"
+    assert set(resumed.checks) <= set(begin.checks)
+    assert resumed.attitude == Attitude(flip=1)
+    assert whole.after(run.rows).duration_s + whole.held[run.rows].start_s == whole.duration_s
 
 
 def test_a_certificate_that_is_expired_is_said() -> None:

@@ -378,7 +378,11 @@ def test_the_status_of_a_run_by_hand_has_the_guidance_and_no_stage(rig_home: Pat
     guidance = Guidance(**shown["guidance"])
     assert (guidance.text, len(guidance.taken), guidance.moves) == ("position 2: +x side up", 1, True)
     assert orientation_drawing(guidance) == orientation_drawing(Guidance(guidance.text, (1.0, 0.0, 0.0), (UP,)))
-    prepared = (before_start(planned, read_bench(HAND)), before_resume("a run", "hand-positions", None))
+    with Record() as record:
+        run = record.run(
+            record.begin("hand-positions", {}, bench={}, identities={}, configuration="", source="a test", constants={})
+        )
+    prepared = (before_start(planned, read_bench(HAND)), before_resume(run, planned, read_bench(HAND), None))
     assert all(each.attitude is None for each in prepared)
     assert all("upside down" in each.checks[0] for each in prepared)
 

@@ -15,7 +15,7 @@ import pytest
 from calibrations.importing.plausible import find_time_doubt
 from calibrations.importing.units import ColumnMapping
 from rig.record import Record
-from rig.services.importing import doubt_of_time, open_file, proposal
+from rig.services.importing import column_words, doubt_of_time, open_file, proposal
 
 THEIRS = "Takt;inclination;table;Ux\n" + "".join(f"{k};90;{30 * k};{2500 + k}\n" for k in range(12))
 
@@ -102,3 +102,51 @@ def test_a_log_of_samples_and_slow_poses_have_no_doubt() -> None:
         "runs from 0 to 188500; in s this is 6.5e+03 s from one pose to the next",
         "ms",
     )
+
+
+POSES = "alpha_deg,beta_deg,vx_v,vy_v,time,pressure\n" + "\n".join(
+    f"{90 - 30 * (k // 12)},{30 * (k % 12)},{2.5 + 0.01 * k},{2.5 - 0.01 * k},{{times[{k}]}},{1000 + k % 3}"
+    for k in range(36)
+)
+
+
+def test_the_terminal_takes_what_the_page_proposes_for_further_columns(tmp_path: Path, rig: Callable[..., Any]) -> None:
+    (path := tmp_path / "poses.csv").write_text(POSES.format(times=[10 * k for k in range(36)]))
+    page = {m.file_column: m.name for m in proposal(open_file(path)).columns.values() if m is not None}
+    assert page["time"] == "t_s"
+    imported = rig("import", str(path))
+    assert imported.status == 0
+    assert "t_s" in imported.out
+    assert "time" not in imported.out.splitlines()[0]
+    assert 'The column "time" is taken as t_s in s. Another meaning or unit: --column NAME=time:UNIT' in imported.err
+    assert "pressure" in imported.out
+    assert '"pressure"' not in imported.err
+    kept = rig("import", str(path), "--column", "time=time")
+    assert "time" in kept.out.splitlines()[0]
+    assert "is taken" not in kept.err
+    stated = rig("import", str(path), "--column", "t_s=time:min")
+    assert "is taken" not in stated.err
+
+
+def test_a_time_without_a_likely_unit_is_not_taken_before_its_unit_is_stated(
+    tmp_path: Path, rig: Callable[..., Any]
+) -> None:
+    (path := tmp_path / "poses.csv").write_text(POSES.format(times=[10_000 * k for k in range(36)]))
+    refused = rig("import", str(path))
+    assert refused.status == 2
+    assert refused.err.endswith(
+        'the time "time" runs from 0 to 350000; in s this is 1e+04 s from one pose to the next; '
+        "state its unit, as in --column t_s=time:ms\n"
+    )
+    with Record() as record:
+        assert record.runs() == []
+    assert rig("import", str(path), "--column", "t_s=time:ms").status == 0
+
+
+def test_a_missing_column_is_named_by_its_quantity() -> None:
+    assert [column_words(name) for name in ("alpha_deg", "vx_v", "az", "mx")] == [
+        "the column of the angle alpha (alpha_deg)",
+        "the column of the output along x (vx_v)",
+        "the column of the specific force along z (az)",
+        "the column of the magnetic field along x (mx)",
+    ]

@@ -13,6 +13,7 @@ import click
 from calibrations.errors import DataError, nearest
 from calibrations.importing.cells import number_or_text
 from calibrations.importing.foreign import PATH, check_unit, needs_mapping
+from calibrations.importing.plausible import Doubt
 from calibrations.importing.proposal import (
     COLUMN_NAMES,
     NAME_PATTERNS,
@@ -24,7 +25,7 @@ from calibrations.importing.proposal import (
 )
 from calibrations.importing.sheet import Sheet
 from calibrations.importing.suggestion import import_command as repeating_command
-from calibrations.importing.units import ColumnMapping, parse_unit
+from calibrations.importing.units import ColumnMapping, column_unit, parse_unit
 from calibrations.table import NUMBERS
 from calibrations.tables import FILE_KINDS
 from rig.cli.terminal.output import emit, json_option, note
@@ -82,7 +83,9 @@ def import_command(
         sheet = open_file(file, topic, bad_lines or "few")
     columns, constants = [ColumnMapping.parse(text) for text in mapped], _constants(constant_texts)
     sheet = replace(sheet, constants={**sheet.constants, **constants})
-    if attended and needs_mapping(sheet, kind, columns):
+    if not needs_mapping(sheet, kind, columns):
+        columns = [*columns, *_take_proposals(sheet, kind, columns, attended)]
+    elif attended:
         kind, columns = ask_mapping(sheet, kind, columns, constant_texts)
     with working(f"storing {file}"):
         run, table = store_sheet(sheet, kind, columns, constants, note)
@@ -104,6 +107,43 @@ def _constants(texts: tuple[str, ...]) -> dict[str, str | float]:
             raise click.UsageError(f'"{text}": write a constant as KEY=VALUE, such as gravity_m_s2=9.81744')
         constants[key] = number_or_text(value)
     return constants
+
+
+def _take_proposals(
+    sheet: Sheet, kind: str | None, mapped: Sequence[ColumnMapping], attended: bool
+) -> list[ColumnMapping]:
+    """The further columns that the page Import would propose, with a note on each.
+
+    Raises DataError if the unit of a time is in doubt and nobody can be asked.
+    """
+    from rig.services.importing import doubt_of_time, further_columns, named_columns
+
+    taken = further_columns(sheet, kind, mapped)
+    clock = next((m for m in taken if m.name == "t_s"), None)
+    if clock is not None and (doubt := doubt_of_time(sheet, [*named_columns(sheet, mapped), *taken])) is not None:
+        taken[taken.index(clock)] = replace(clock, unit=_unit_of_time(sheet, clock, doubt, attended))
+    for m in taken:
+        unit = m.unit or column_unit(m.name)
+        taken_as = f"{m.name} in {unit}" if unit else m.name
+        note(
+            f'The column "{m.file_column}" is taken as {taken_as}. Another meaning or unit: '
+            f"--column NAME={m.file_column}:UNIT; as it is: --column {m.file_column}={m.file_column}"
+        )
+    return taken
+
+
+def _unit_of_time(sheet: Sheet, clock: ColumnMapping, doubt: Doubt, attended: bool) -> str:
+    """The unit of the time, by a person. Raises DataError without one."""
+    from rig.services.importing import TIMES
+
+    reason, fits = doubt
+    if not attended:
+        stated = replace(clock, unit=fits or "s").text
+        raise DataError(
+            f'{sheet.name}: the time "{clock.file_column}" {reason}; state its unit, as in --column {stated}'
+        )
+    note(f'The time "{clock.file_column}" {reason}; no stage does that.')
+    return str(click.prompt("Its unit", default=fits or None, type=click.Choice(TIMES), err=True))
 
 
 # Questions to a person about the columns of a file.

@@ -9,10 +9,11 @@ from collections.abc import Callable, Iterable
 from functools import wraps
 
 import click
-from click.shell_completion import CompletionItem
+from click.shell_completion import CompletionItem, get_completion_class, shell_complete
 
 Complete = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 MOST_RUNS = 50  # newest first
+LAST = "last"  # the newest run, or with the name of a procedure as the next word the newest of these
 
 
 def _offer(words: Callable[[], Iterable[str]]) -> Complete:
@@ -59,7 +60,7 @@ def complete_model(context: click.Context, parameter: click.Parameter, begun: st
 
 @_offer
 def complete_run() -> Iterable[str]:
-    """The newest runs by id, their sensors, and `last`."""
+    """`last`, the newest runs by id, and their sensors."""
     from rig.record import Record
 
     if not Record.is_there():
@@ -67,7 +68,20 @@ def complete_run() -> Iterable[str]:
     with Record.to_read() as record:
         runs = record.runs()[:MOST_RUNS]
     sensors = [name for run in runs for name in run.sensors if " " not in name]
-    return [*(run.run for run in runs), *sensors, *(["last"] if runs else [])]
+    return [*([LAST] if runs else []), *(run.run for run in runs), *sensors]
+
+
+@_offer
+def _complete_last() -> Iterable[str]:
+    """The procedures of the runs: `last sweep` is the newest sweep."""
+    from procedures.catalogue import paths
+    from rig.record import Record
+
+    if not Record.is_there():
+        return []
+    with Record.to_read() as record:
+        measured = {run.procedure for run in record.runs()}
+    return [name for name in paths() if name in measured]
 
 
 @_offer
@@ -79,6 +93,21 @@ def complete_sensor() -> Iterable[str]:
         return []
     with Record.to_read() as record:
         return [name for run in record.runs() for name in run.sensors]
+
+
+def answer_shell(command: click.Command, name: str, variable: str, instruction: str) -> int:
+    """Answer a shell that asks for its script or completes a word, as the instruction in `variable` says."""
+    shell, _, _ = instruction.partition("_")
+    kind = get_completion_class(shell)
+    if kind is not None and instruction.endswith("_complete"):
+        asking = kind(command, {}, name, variable)
+        words, begun = asking.get_completion_args()
+        if words[-1:] == [LAST]:  # two words for one argument, which click does not know
+            context = click.Context(command)
+            for item in _complete_last(context, click.Argument([LAST]), begun):
+                click.echo(asking.format_completion(item))
+            return 0
+    return shell_complete(command, {}, name, variable, instruction)
 
 
 def complete_data(context: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem]:

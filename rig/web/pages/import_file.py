@@ -20,9 +20,12 @@ from calibrations.importing.sheet import Sheet
 from calibrations.importing.topics import SeveralTopics
 from calibrations.importing.units import ColumnMapping, column_unit
 from calibrations.table import Constant
+from calibrations.text import join_words
 from calibrations.text import unit as unit_text
 from rig.services.importing import (
+    TIMES,
     Preview,
+    column_words,
     data_chart,
     doubt_of_time,
     lacking,
@@ -75,7 +78,6 @@ CONSTANT_KINDS = {  # kinds that have a constant; all kinds where it is not here
     "sample_rate_hz": ("positions", "rates", "turns", "still", "motion"),
 }
 PICTURE = "Data as imported"
-TIMES = ("s", "min", "h", "ms")
 UNIT_DOUBT = re.compile(  # the end of a message about a unit that does not fit the values
     r"\nIf its unit is (?P<likely>\S+), import it with:.*\nIf its unit is (?P<stated>\S+) after all, "
     r"state it: --column (?P<name>\w+)=",
@@ -265,7 +267,9 @@ class ImportPage:
             return
         sheet = replace(self.sheet, constants={**self.sheet.constants, **self.constants})
         if lacks := lacking(sheet, kind, mappings):
-            self._show_fault("", f"Still needed: {', '.join(lacks)}. Choose the columns that hold them.")
+            pronoun = "them" if len(lacks) > 1 else "it"
+            needed = join_words(map(column_words, lacks))
+            self._show_fault("", f'Still needed: {needed}. Select {pronoun} under "meaning".')
             return
         try:
             preview_table = await off_loop(preview, self.sheet, kind, mappings, self.constants)

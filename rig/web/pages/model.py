@@ -210,8 +210,12 @@ class Workbench:
         with self.newer, box("note row-of").props("role=status"):
             words(f"{subject}: {extent_text}this page analyses {self.session.data.description}.", "grow")
             if is_changed:
-                reopen = partial(self.go, self.data, self.model, self.noise)
-                ui.button("Update", icon="refresh", on_click=reopen).props("dense")
+                ui.button("Update", icon="refresh", on_click=self._update).props("dense")
+
+    def _update(self) -> None:
+        """Open the changed data, whose change is shown already."""
+        self.desk.updates.add((self.data, self.model, self.noise))
+        self.go(self.data, self.model, self.noise)
 
     async def show(self, session: ModelSession[Any]) -> None:
         """Show pictures and error of the present model, then its missing effects."""

@@ -93,6 +93,7 @@ class Choice:
             words("A table with a header. If its columns have other names or units, you choose their meaning next.",
                   "quiet small")  # fmt: skip
             upload(self._open_upload)
+            ui.button("Cancel", on_click=dialog.close).props("flat")
         dialog.open()
 
     async def _open_upload(self, path: Path) -> None:

@@ -55,7 +55,7 @@ def register(desk: Desk) -> None:
                     planning = PlanForm(bench_file, bench, dict(request.query_params))
                     Instruments(desk, bench)
                 with div("stack"):
-                    live = Live()
+                    live = Live(planning.allow)
                     planning.lay_out_plan()
             planning.started = live.look
             keys["p"] = Key("pause the run", live.pause_run)
@@ -146,6 +146,7 @@ class PlanForm:
         self.started: Callable[[], Awaitable[None]] | None = None
         self.turn, self.address, self.visit = 0, "", Visit()
         self.planned: Plan | None = None
+        self.under_way = False  # a run is in progress
         names = {name: f"{name}: {summary(path)}" for name, path in paths(bench.folders.procedures).items()}
         selected = settings.get("procedure", DEFAULT_PROCEDURE)
         with box():
@@ -163,6 +164,7 @@ class PlanForm:
                 self.button.disable()  # until there is a plan
                 self.optimal = ui.button("Choose poses for a model", icon="auto_fix_high", on_click=self._optimal)
                 self.optimal.props("outline")
+                self.waits = words("", "quiet small").props("role=status")
 
     def lay_out_plan(self) -> None:
         """Place the box of the plan on the page."""
@@ -229,9 +231,19 @@ class PlanForm:
         planned = await shown(self.plan, "Planning; nothing moves", title, work, lambda: turn == self.turn)
         if planned is not None:
             self.planned = planned
-            self.button.enable()
+            self._enable()
             with self.plan:
                 _show(planned, self.bench)
+
+    def allow(self, under_way: bool) -> None:
+        """Called with whether a run is in progress: two cannot be."""
+        self.under_way = under_way
+        self._enable()
+
+    def _enable(self) -> None:
+        """Enable Start if there is a plan and no run in progress."""
+        self.button.set_enabled(self.planned is not None and not self.under_way)
+        self.waits.set_text("Start waits until the present run ends." if self.under_way else "")
 
     def _plan(self, procedure: Procedure, settings: Mapping[str, str]) -> Plan:
         planned = plan(self.bench, procedure, parse(procedure, settings))

@@ -12,7 +12,8 @@ from rig.bench import Bench
 from rig.drawings import Attitude, strip
 from rig.files import free_bytes, home
 from rig.planning.plan import Plan
-from rig.planning.preparation import HAND_CHECKS, checks, first_question, mounting, stops, storage
+from rig.planning.preparation import checks, first_question, mounting, stops, storage
+from rig.record import Run
 from rig.web.parts import dialog_with_name, div, facts, for_page, message, words
 
 
@@ -44,14 +45,25 @@ def before_start(plan: Plan, bench: Bench) -> Preparation:
     )
 
 
-def before_resume(run: str, procedure: str, attitude: Attitude | None) -> Preparation:
-    """The preparation of a stopped run that continues; `attitude` is None if the sensor is in a hand."""
-    by_stages = (
-        "The cables can follow the stages over the whole range, and nothing and nobody is within their reach",
-        "The sensor is fastened as before, as in the drawing",
+def before_resume(run: Run, plan: Plan, bench: Bench, attitude: Attitude | None) -> Preparation:
+    """The preparation of a stopped run that continues.
+
+    `plan` is that of the whole run on its `bench`. `attitude`: the last known one; None if the sensor is in a hand.
+    """
+    remaining = plan.after(run.rows)
+    names = bench.sensors or {" ".join(filter(None, (bench.sensor.name, bench.sensor.serial))): bench.sensor}
+    head = {
+        "Sensors" if bench.sensors else "Sensor": ", ".join(names),
+        "Recorded": f"{run.rows} of {plan.poses} poses",
+    }
+    rows = plan_facts(remaining, bench)
+    rows["Takes"] = f"{rows['Takes']}; the whole run {_duration_in_words(plan.duration_s)}"
+    return Preparation(
+        f"Resume {run.procedure} {run.run}",
+        head | rows,
+        [for_page(capital(line)) for line in checks(plan)],
+        attitude if plan.reach else None,
     )
-    by_hand = [capital(line) for line in HAND_CHECKS]
-    return Preparation(f"Resume {procedure} {run}", {}, by_hand if attitude is None else by_stages, attitude)
 
 
 def plan_facts(plan: Plan, bench: Bench) -> dict[str, str]:

@@ -6,15 +6,20 @@ The page reads the status of the process and the record again, so a page that is
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
 from nicegui import ui
 
 from calibrations.text import capital
+from procedures.catalogue import find
 from procedures.session import Guidance
+from procedures.settings import parse
+from rig.bench import Bench
 from rig.drawings import Attitude, orientation_drawing, page, strip
+from rig.planning.plan import Plan, plan
+from rig.record import Record, Run
 from rig.runs.background import control
 from rig.runs.background.status import NOT_BEGUN, OpenQuestion, Status
 from rig.runs.signals import ON_A_PAGE, SIGNAL_SOURCES
@@ -23,7 +28,7 @@ from rig.web.calculations import off_loop
 from rig.web.frame import control_run
 from rig.web.pages.run_begin import BeginDialog, before_resume
 from rig.web.pages.run_record import OverTime
-from rig.web.parts import afresh, box, button, dialog_with_name, div, for_page, show_error, table, words
+from rig.web.parts import afresh, box, button, dialog_with_name, div, for_page, notify_error, show_error, table, words
 
 LOOK_S = 0.4
 PHASES = {
@@ -54,8 +59,9 @@ ENDS = {"complete": "good", "stopped": "doubt", "failed": "bad"}
 class Live:
     """Reads and shows the status while the page is open."""
 
-    def __init__(self) -> None:
+    def __init__(self, on_look: Callable[[bool], None]) -> None:
         self.status: Status | None = None
+        self.on_look = on_look  # with whether a run is in progress
         self.present = False  # the run was in progress while this page was open
         with box("stack live") as self.box:
             with div("row-of"):
@@ -117,9 +123,14 @@ class Live:
         if (status := self.status) is not None:
             ui.navigate.to(ModelState(status.run).address if status.done else f"/record/{status.run}")
 
-    def go_on(self) -> None:
+    async def go_on(self) -> None:
         """Open the checks before an incomplete run resumes."""
         if (status := self.status) is None or not status.run:
+            return
+        try:
+            run, bench, planned = await off_loop(_interrupted, status.run)
+        except Exception as error:
+            notify_error(error)
             return
 
         async def begin(_sensor: Mapping[str, str], _answers: Mapping[str, str]) -> None:
@@ -127,12 +138,13 @@ class Live:
             await self.look()
 
         attitude = None if status.guidance else Attitude(**status.attitude) if status.attitude else Attitude()
-        BeginDialog(before_resume(status.run, status.procedure, attitude), begin)
+        BeginDialog(before_resume(run, planned, bench, attitude), begin)
 
     async def look(self) -> None:
         """Show the present status; only changes are sent."""
         status = control.latest()
         self.box.set_visibility(status is not None)
+        self.on_look(status is not None and status.phase != "ended")
         if status is None:
             return
         if status != self.status:
@@ -240,6 +252,15 @@ class Live:
                 words(f"✓ position {taken_count} taken", "chip good big-state").props("role=status")
         if previous is not None and taken_count > len(previous.get("taken", ())):
             ui.run_javascript(TONE)
+
+
+def _interrupted(name: str) -> tuple[Run, Bench, Plan]:
+    """An incomplete run, its bench, and the plan of the whole run. Raises RecordError and what `plan` raises."""
+    with Record.to_find(name, local_only=True) as record:
+        run = record.run(name)
+    bench = Bench.model_validate(run.bench)
+    procedure = find(run.procedure, bench.folders.procedures)
+    return run, bench, plan(bench, procedure, parse(procedure, run.settings))
 
 
 def _hand_drawing(guidance: Mapping[str, Any]) -> str:

@@ -23,6 +23,7 @@ from rig.services.exclusion import exclude, find_numbered_run
 from rig.services.export import export
 from rig.services.history import lives
 from rig.services.next_steps import page_steps, result_rows
+from rig.services.page_words import page_step
 from rig.services.request import Request
 from rig.web.address import ModelState
 from rig.web.calculations import Visit, off_loop
@@ -346,7 +347,7 @@ def _results(run: Run) -> None:
 
 def _circumstances(run: Run) -> tuple[dict[str, str], ...]:
     """The run and its settings, the instruments, the constants of sensor and rig."""
-    message = {"message": run.message} if run.message else {}
+    message = {"message": for_page(page_step(run.message).text)} if run.message else {}
     settings = {setting_label(name): setting_text(value) for name, value in run.settings.items()}
     constants = {setting_label(name): setting_text(value) for name, value in run.constants.items()}
     return {"procedure": run.procedure, "bench or file": run.source, **message, **settings}, run.instruments, constants
