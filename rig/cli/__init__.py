@@ -5,6 +5,7 @@ It returns nothing, or the exit status (1: done, and a limit or check was not me
 
 from __future__ import annotations
 
+import atexit
 import gc
 import importlib
 import os
@@ -140,6 +141,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     choose_kernel_cache()
     if arguments is None:
         say_when_compiling()
+        atexit.register(gc.freeze)  # the interpreter's last collection would take half a second after a run
     gc.set_threshold(NEW_OBJECTS)
 
     if instruction := os.environ.get(COMPLETE):  # the shell asks what may follow

@@ -136,6 +136,28 @@ def completed(capture: pytest.CaptureFixture[bytes]) -> str:
     return capture.readouterr().out.decode()
 
 
+CYCLE = """
+import atexit, sys
+class Cycle:
+    def __init__(self):
+        self.own = self
+    def __del__(self):
+        print("collected", file=sys.stderr)
+sys.argv = ["rig", "models"]
+from rig.cli import main
+try:
+    main()
+finally:
+    atexit.register(Cycle)
+"""
+
+
+def test_the_end_of_a_program_collects_no_garbage() -> None:
+    """It took half a second after a run, while its caller waited; nothing in it needs a finaliser."""
+    ended = subprocess.run([sys.executable, "-c", CYCLE], capture_output=True, text=True, timeout=60, check=True)
+    assert (ended.stdout != "", ended.stderr) == (True, "")
+
+
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_a_shell_gets_its_completion_script(
     shell: str, monkeypatch: pytest.MonkeyPatch, capsysbinary: pytest.CaptureFixture[bytes]

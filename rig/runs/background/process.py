@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import json
 import os
 import select
@@ -117,4 +119,5 @@ def _carry_out(order: Order, record: Record, writer: Attendant) -> Outcome:
 
 
 if __name__ == "__main__":
+    atexit.register(gc.freeze)  # as in `rig.cli.main`
     main(sys.argv[1])
