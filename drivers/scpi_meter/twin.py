@@ -19,7 +19,7 @@ from drivers.transport.server import Connection, Port, Server, Twin
 if TYPE_CHECKING:
     from drivers.world.batch import AnyWorld
 
-__all__ = ["FAULTS", "LISTEN", "serve"]
+__all__ = ["FAULTS", "LISTEN", "Scanner", "serve"]
 
 LISTEN = "tcp://127.0.0.1:0"
 FAULTS = {
@@ -32,8 +32,15 @@ THINKING_S = 0.002
 OVERLOAD_V = 9.9e37
 BEYOND = 1.2  # of its range, up to which it measures
 MOST_RANGE_V = 300.0
+SHORTEST_S, LONGEST_S = 1e-6, 1e6  # between two scans
+MOST_SCANS = 10**9
 MOST_ERRORS = 10
-TEXTS = {-113: "Undefined header", -222: "Data out of range", -350: "Queue overflow"}
+TEXTS = {
+    -104: "Data type error",
+    -113: "Undefined header",
+    -222: "Data out of range",
+    -350: "Queue overflow",
+}
 LIST = re.compile(r"\(@([\d,]+)\)")
 
 
@@ -66,7 +73,11 @@ class Scanner(Twin):
         if obey is None:
             self._fail(-113)
             return None
-        return obey(arguments, now_s)
+        try:
+            return obey(arguments, now_s)
+        except ValueError:  # not a number
+            self._fail(-104)
+            return None
 
     @property
     def _commands(self) -> dict[str, Callable[[str, float], str | None]]:
@@ -102,7 +113,7 @@ class Scanner(Twin):
     def _configure(self, arguments: str) -> None:
         self._stop()
         range_v = float(arguments.partition(",")[0])
-        if range_v > MOST_RANGE_V:
+        if not 0 < range_v <= MOST_RANGE_V:
             self._fail(-222)
             return
         self._range_v = range_v
@@ -112,10 +123,18 @@ class Scanner(Twin):
         self._numbers = sorted(int(k) for k in match[1].split(",")) if (match := LIST.search(arguments)) else [0]
 
     def _set_rate(self, arguments: str) -> None:
-        self._rate_hz = 1 / float(arguments)
+        interval_s = float(arguments)
+        if not SHORTEST_S <= interval_s <= LONGEST_S:
+            self._fail(-222)
+            return
+        self._rate_hz = 1 / interval_s
 
     def _set_count(self, arguments: str) -> None:
-        self._count = int(arguments)
+        count = int(arguments)
+        if not 1 <= count <= MOST_SCANS:
+            self._fail(-222)
+            return
+        self._count = count
 
     def _begin(self, now_s: float) -> None:
         self._memory.clear()
@@ -123,7 +142,7 @@ class Scanner(Twin):
         self.advance(now_s)
 
     def _remove(self, arguments: str) -> str | None:
-        if (count := int(arguments)) > len(self._memory):
+        if not 0 <= (count := int(arguments)) <= len(self._memory):
             self._fail(-222)
             return None
         return _numbers_text([self._memory.popleft() for _ in range(count)])

@@ -14,6 +14,7 @@ import pytest
 from drivers.clock import SimulatedClock, WallClock
 from drivers.errors import BadFrame, DriverError, LimitError, LinkRefused, LinkTimeout, OverRange, Refused, StreamError
 from drivers.scpi_meter import driver
+from drivers.scpi_meter.twin import Scanner
 from drivers.transport import Address, Links
 from drivers.transport.address import Url
 from drivers.transport.faults import Fault, faults_of
@@ -224,3 +225,21 @@ def test_a_count_of_readings_that_is_no_number_is_a_bad_frame() -> None:
     """Found by fuzzing: -1e9990 is minus infinity."""
     with pytest.raises(BadFrame, match="not a number of readings"):
         scpi_answers(timer=True)(SCPI.replace(b"\n0\n4\n", b"\n-1e9990\n4\n"))
+
+
+@pytest.mark.parametrize(
+    ("line", "code"),
+    [
+        ("TRIG:TIM soon", -104), ("TRIG:TIM 0", -222), ("SAMP:TIM nan", -222), ("TRIG:TIM 1e-300", -222),
+        ("TRIG:COUN", -104), ("SAMP:COUN 0", -222), ("CONF:VOLT:DC AUTO,(@101)", -104), ("CONF:VOLT:DC nan", -222),
+        ("ROUT:SCAN (@101,,102)", -104), ("DATA:REM? all", -104), ("DATA:REM? -1", -222), ("TRIG 1", -113),
+    ],
+)  # fmt: skip
+def test_the_simulated_scanner_refuses_a_line_that_it_cannot_use(small_world: Any, line: str, code: int) -> None:
+    """Another program may ask it anything: it goes on, with an error in its queue."""
+    scanner = Scanner(small_world, driver.Settings(channels=CHANNELS))
+    assert scanner.answer(line, 0.0) is None
+    scanner.answer("INIT", 0.0)
+    scanner.advance(10.0)
+    assert str(scanner.answer("SYST:ERR?", 10.0)).startswith(f"{code:+d},")
+    assert scanner.answer("*IDN?", 10.0)
