@@ -84,7 +84,7 @@ def find(procedure_name: str, folder: Path | None = None) -> Procedure:
 def _is_procedure(path: Path) -> bool:
     try:
         return path.stem in _outline(path.read_text(encoding="utf-8"))[0]
-    except (SyntaxError, UnicodeDecodeError):
+    except (SyntaxError, ValueError, RecursionError, MemoryError):  # bytes that are no text, a zero, deep brackets
         return False
 
 

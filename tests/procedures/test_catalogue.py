@@ -39,6 +39,12 @@ def test_a_file_with_a_function_of_its_name_is_a_procedure(folder: Path) -> None
     assert summary(folder / "noise_floor.py") == "a still record"
 
 
+@pytest.mark.parametrize("content", [b"def spoilt(rig): ...\0", b"\xff", b"x = " + b"-" * 100_000 + b"1"])
+def test_a_spoilt_file_hides_no_other_procedure(folder: Path, content: bytes) -> None:
+    (folder / "spoilt.py").write_bytes(content)
+    assert set(paths(folder)) == {"noise-floor", *paths()}
+
+
 def test_it_is_loaded_when_it_is_asked_for(folder: Path) -> None:
     procedure = find("noise-floor", folder)
     assert find("noise_floor", folder).path == procedure.path == folder / "noise_floor.py"
