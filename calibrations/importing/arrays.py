@@ -232,7 +232,10 @@ def matlab_topics(path: Path) -> list[Topic]:
     """The variables and structs of a MATLAB file of version 5 to 7.2. Raises DataError."""
     from scipy.io import loadmat
 
+    from calibrations.importing.matlab_elements import require_sound
+
     require_size(path, _matlab_bytes(path))
+    require_sound(path)
     variables = loadmat(path, squeeze_me=False, struct_as_record=True)
     public_variables = {name: value for name, value in variables.items() if not name.startswith("__")}
     return [topic for group in _matlab_groups(public_variables, "", 0) for topic in group.topics()]

@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from scipy.io import savemat
+from scipy.sparse import csc_array
 
 from calibrations.errors import DataError
 from calibrations.importing import topics
@@ -258,3 +259,48 @@ def test_a_damaged_list_of_a_workbook_is_told(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes().replace(b"PK\x01\x02", b"PK\x01\x03", 1))
     with pytest.raises(DataError, match="is damaged or cut short"):
         open_sheet(path)
+
+
+def element(kind: int, data: bytes) -> bytes:
+    """An element of a MATLAB file."""
+    return kind.to_bytes(4, "little") + len(data).to_bytes(4, "little") + data + bytes(-len(data) % 8)
+
+
+def array(content: bytes, array_class: int = 6, dimensions: tuple[int, ...] = (1, 2)) -> bytes:
+    lengths = b"".join(length.to_bytes(4, "little") for length in dimensions)
+    return element(
+        14, element(6, bytes([array_class, 0, 0, 0, 0, 0, 0, 0])) + element(5, lengths) + element(1, b"ax") + content
+    )
+
+
+TWO = element(9, np.ones(2).tobytes())
+NAMED = element(5, (4).to_bytes(4, "little")) + element(1, b"ax\0\0")
+SPOILT = {
+    "a type that does not exist": (array(element(99, bytes(16))), "numbers of the unknown type 99"),
+    "more numbers than there are": (array(TWO, dimensions=(1, 3)), "16 bytes for 3 numbers of the type 9"),
+    "forty dimensions": (array(TWO, dimensions=(1,) * 40), "160 bytes of dimensions"),
+    "a class that does not exist": (array(TWO, array_class=77), "an array of the unknown class 77"),
+    "names without a length": (
+        array(element(5, bytes(4)) + element(1, b"ax"), array_class=2), "2 bytes of field names of 0 bytes each"
+    ),
+    "structs without an end": (array(NAMED, array_class=2, dimensions=(9999, 9999)), "an array of 99980001 structs"),
+    "a cut array": (array(TWO)[:-8], "it ends within an array"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("content", "reason"), SPOILT.values(), ids=SPOILT)
+def test_a_matlab_file_that_would_end_the_process_is_refused(content: bytes, reason: str, tmp_path: Path) -> None:
+    """SciPy takes what these files state as given, and reads other memory."""
+    path = tmp_path / "log.mat"
+    savemat(path, {"t_s": TIME})
+    path.write_bytes(path.read_bytes() + content)
+    with pytest.raises(DataError, match=f"log.mat: is damaged or cut short .*{reason}.*copy it again"):
+        open_sheet(path)
+
+
+def test_structs_cells_texts_and_sparse_matrices_of_matlab_are_sound(tmp_path: Path) -> None:
+    others = {"who": "me", "list": np.array([1, "two"], dtype=object), "some": csc_array(np.eye(3)), "z": 1 + 2j}
+    for compressed in (False, True):
+        path = tmp_path / f"{compressed}.mat"
+        savemat(path, {"imu": OURS | {"inner": others}, **others}, do_compression=compressed)
+        assert {"ax", "ay", "az", "t_s"} <= set(open_sheet(path, "imu").header)
