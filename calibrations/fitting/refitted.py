@@ -10,32 +10,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.fitting.minimise import newton_step
-from calibrations.fitting.solution import Solution, folds
-from calibrations.means.noise import rms
+from calibrations.fitting.problem import Problem
+from calibrations.means.noise import Noise, rms
 from calibrations.table import Array
 
 STEPS = 4
 SMALL_GAIN = 3e-3  # of the mean square of the residual or the noise
 
 
-def unseen_error(solution: Solution) -> float:
+def unseen_error(problem: Problem, noise: Noise, theta: Array, jacobian: Array, fold: NDArray[np.intp]) -> float:
     """Pooled rms of the error on unseen rows over the noise floor; each fold is predicted by a fit to the others.
 
-    A parameter that the other rows do not determine is drawn to its estimate, with its typical magnitude as standard
-    deviation, as in `solution.held_out`.
+    From the parameters of all rows, `theta` (p,), the derivatives of the residual there (channels, n, p), and the fold
+    of each row (n,). A parameter that the other rows do not determine is drawn to its estimate, with its typical
+    magnitude as standard deviation.
     """
-    fold = folds(solution.table)
-    error = np.empty_like(solution.residual)
+    error = np.empty(jacobian.shape[:2])
     for k in range(int(fold.max()) + 1):
-        theta = _without_rows(solution, fold == k)
-        error[:, fold == k] = solution.problem.residual(theta)[:, fold == k]
-    return float(np.sqrt(np.mean((rms(error) / solution.noise.floor) ** 2)))
+        refitted = without_rows(problem, noise, theta, jacobian, fold == k)
+        error[:, fold == k] = problem.residual(refitted)[:, fold == k]
+    return float(np.sqrt(np.mean((rms(error) / noise.floor) ** 2)))
 
 
-def _without_rows(solution: Solution, left_out: NDArray[np.bool_]) -> Array:
-    """The parameters (p,) of a fit without some rows (n,), from those of all rows on."""
-    problem, noise, layout = solution.problem, solution.noise, solution.problem.layout
-    channels, n = solution.residual.shape
+def without_rows(problem: Problem, noise: Noise, start: Array, jacobian: Array, left_out: NDArray[np.bool_]) -> Array:
+    """The parameters (p,) of a fit without some rows (n,), from those of all rows on, `start`."""
+    layout, (channels, n, _) = problem.layout, jacobian.shape
     has_prior = np.isfinite(layout.prior)
     drawn = np.diag(np.where(has_prior, 0.0, 1 / layout.typical))[~has_prior]
 
@@ -46,9 +45,9 @@ def _without_rows(solution: Solution, left_out: NDArray[np.bool_]) -> Array:
 
     def white(theta: Array) -> Array:
         residual = kept(problem.residual(theta)[:, :, None])[:, 0]
-        return np.concatenate([residual, layout.prior_rows @ theta, drawn @ (theta - solution.theta)])
+        return np.concatenate([residual, layout.prior_rows @ theta, drawn @ (theta - start)])
 
-    theta, residual, jacobian = solution.theta, white(solution.theta), solution.jacobian
+    theta, residual = start, white(start)
     for number in range(STEPS):
         if number:
             jacobian = problem.jacobian(theta)

@@ -70,7 +70,7 @@ class Solution:
         if error > FAR * self.cross_validated_excess and not self.problem.adds:
             from calibrations.fitting.refitted import unseen_error  # few models need it
 
-            error = unseen_error(self)
+            error = unseen_error(self.problem, self.noise, self.theta, self.jacobian, folds(self.table))
         return max(error, self.pooled_excess)
 
     def held_out_with(self, extra: Array) -> float:

@@ -168,7 +168,7 @@ def test_unseen_poses_that_alone_determine_a_parameter_are_predicted_by_fits_wit
             return np.append(of_rows, (theta - found.theta) / layout.typical)
 
         least = scipy.optimize.least_squares(others, found.theta, bounds=layout.bounds, x_scale=layout.typical).cost
-        without = refitted._without_rows(found, number == k)
+        without = refitted.without_rows(found.problem, found.noise, found.theta, found.jacobian, number == k)
         assert float(np.sum(others(without) ** 2)) / 2 == pytest.approx(least, abs=0.05)
 
 
