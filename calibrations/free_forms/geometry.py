@@ -38,8 +38,9 @@ SEEN = 3.5  # standard uncertainties: a smaller linear part may be noise
 IMMATERIAL = 0.15  # noise floors: a smaller angle is no matter
 STEPS = 4  # of Gauss-Newton: angles of some degrees need three
 SMALL_DEG = 1e-3  # of a numerical derivative
+# Over the cross axis also a product with the own force, as u^2 b = (1 - z^2 - b^2) b; u z has no line over z.
 OVER_CROSS = ("cross-response", "scale-over-cross", "force")
-OVER_Z = ("z-response", "scale-over-z", "force", "stage-angle-alpha")
+OVER_Z = ("z-response", "force", "stage-angle-alpha")
 OVER_BETA = ("beta-bias",)  # in one wave a turn, a quarter of a turn apart on x and y, it is a tilt of the base
 
 

@@ -54,3 +54,12 @@ def test_one_axis_has_stage_zeros_and_no_angle_to_another_axis() -> None:
     found = dataset(Table.from_columns("poses", columns)).discover(read_model("linear"), catalogue())
     assert "cubic-nonlinearity" in found.causes
     assert {"stage-zero-offset", "base-tilt"} & set(found.causes)
+
+
+def test_a_small_misalignment_has_its_name_beside_a_scale_factor_over_the_out_of_plane_force() -> None:
+    """Of 2 noise floors each: such a scale factor multiplies the own force, and has no line over the other force."""
+    force = forces()
+    lean = np.radians(0.013)
+    sensed = force[:, :2] + lean * np.column_stack([force[:, 2], -force[:, 2]])
+    found = discover(sensed, force[:, :2] * force[:, 2:] ** 2 * [-7e-4, 0.0])
+    assert set(found.causes) == {"z-axis-scale", "axis-misalignment"}
