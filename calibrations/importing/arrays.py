@@ -296,7 +296,8 @@ def _parquet_cells(parquet: Any, path: Path) -> Cells:
     import pyarrow as pa
 
     cells: dict[str, Array | tuple[str, ...]] = {}
-    for name, column in (lambda table: zip(table.column_names, table.columns, strict=True))(parquet.read_table(path)):
+    table = parquet.read_table(path)
+    for name, column in zip(table.column_names, table.columns, strict=True):
         kind = column.type
         if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
             steps = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[kind.unit]

@@ -26,9 +26,7 @@ Settings = TypeVar("Settings", bound=DigitalSettings)
 QUIET_S = 2.0  # silence that ends a record; at least ten samples
 POLL_S = 0.4  # samples that wait in the buffers of the system are read so often
 STUCK = 100  # equal samples of one axis in successive records, while another axis of the same kind changes
-LIVELY = (
-    4  # different values in a record: with less noise, a sound axis is constant between two steps of the resolution
-)
+LIVELY = 4  # different values in a record: a sound axis with less noise may be constant, between two steps
 RATE_OFF = 0.05  # of the stated rate
 TEST_S = 2.0
 ONE_G = {"g": 1.0, "m/s^2": 9.80665}

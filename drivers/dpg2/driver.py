@@ -87,10 +87,8 @@ class Level:
             reading = self.read()
         except InstrumentError as fault:
             return [Check("reading", False, fault.what)]
-        reading_text = (
-            f"x {reading.x_deg:+.3f}, y {reading.y_deg:+.3f} deg, standard deviation {reading.std_deg:.4f} deg"
-        )
-        return [Check("reading", True, reading_text)]
+        angles = f"x {reading.x_deg:+.3f}, y {reading.y_deg:+.3f} deg"
+        return [Check("reading", True, f"{angles}, standard deviation {reading.std_deg:.4f} deg")]
 
     def read(self) -> Reading:
         """The mean of `settings.readings` readings, once they agree.

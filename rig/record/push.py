@@ -198,8 +198,9 @@ def verify(lab: Record) -> Verification:
     """Compute the digest of every pushed run again, and compare it with the digest at its arrival. Raises LabAway."""
     with lab.engine.connect() as source:
         rows = source.execute(select(arrivals.c.run, arrivals.c.digest).order_by(arrivals.c.run)).all()
-        is_sound_by_run = {row.run: digest(source, row.run) == row.digest for row in rows if row.digest is not None}
-    sound, changed_runs = (
-        tuple(run for run, is_sound in is_sound_by_run.items() if is_sound is state) for state in (True, False)
+        arrived = {row.run: digest(source, row.run) == row.digest for row in rows if row.digest is not None}
+    return Verification(
+        sound=tuple(run for run, unchanged in arrived.items() if unchanged),
+        on_their_way=tuple(row.run for row in rows if row.digest is None),
+        changed=tuple(run for run, unchanged in arrived.items() if not unchanged),
     )
-    return Verification(sound, tuple(row.run for row in rows if row.digest is None), changed_runs)

@@ -253,27 +253,20 @@ answers = Table(  # about one sensor of a fleet, so that the same question is no
 def upgrade(connection: Connection, version: int) -> None:
     """Make missing tables, and change those of the older `version`; 0 is a database without tables."""
     metadata.create_all(connection)
-    for statement in (migration for old in range(version or SCHEMA, SCHEMA) for migration in MIGRATIONS[old]):
-        table, column = statement.split()[2:6:3]  # ALTER TABLE poses ADD COLUMN up; a new table has every column
-        if column not in {known["name"] for known in inspect(connection).get_columns(table)}:
-            connection.execute(text(statement))
+    for table, column, definition in (added for old in range(version or SCHEMA, SCHEMA) for added in NEW_COLUMNS[old]):
+        if column not in {known["name"] for known in inspect(connection).get_columns(table)}:  # a new table has all
+            connection.execute(text(f"ALTER TABLE {table} ADD COLUMN {column} {definition}"))
 
 
-_TURNS = (
-    "ALTER TABLE poses ADD COLUMN up VARCHAR NOT NULL DEFAULT 'z'",
-    "ALTER TABLE poses ADD COLUMN rate_deg_s FLOAT NOT NULL DEFAULT 0",
-)
-# Statements from each version to the next, see `upgrade`.
-MIGRATIONS = {
-    1: ("ALTER TABLE poses ADD COLUMN excluded VARCHAR",),
-    2: tuple(f"ALTER TABLE poses ADD COLUMN {role}_read_deg FLOAT" for role in ("alpha", "beta")),
+_TURNS = (("poses", "up", "VARCHAR NOT NULL DEFAULT 'z'"), ("poses", "rate_deg_s", "FLOAT NOT NULL DEFAULT 0"))
+# Columns (table, name, definition) that the version after each one added to older tables, see `upgrade`.
+NEW_COLUMNS: Mapping[int, tuple[tuple[str, str, str], ...]] = {
+    1: (("poses", "excluded", "VARCHAR"),),
+    2: (("poses", "alpha_read_deg", "FLOAT"), ("poses", "beta_read_deg", "FLOAT")),
     3: _TURNS,
     4: _TURNS,  # two programs wrote version 4, one of them without these columns
     5: (),  # a new table
-    6: ("ALTER TABLE runs ADD COLUMN uid VARCHAR NOT NULL DEFAULT ''",),  # and a new table
+    6: (("runs", "uid", "VARCHAR NOT NULL DEFAULT ''"),),  # and a new table
     7: (),  # a new table
-    8: tuple(
-        f"ALTER TABLE {table} ADD COLUMN checksum BIGINT"
-        for table in ("runs", "poses", "readings", "blocks", "dwells", "columns")
-    ),
+    8: tuple((table, "checksum", "BIGINT") for table in ("runs", "poses", "readings", "blocks", "dwells", "columns")),
 }

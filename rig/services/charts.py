@@ -130,9 +130,7 @@ class RunTime:
     def of(cls, record: Record, run: Run) -> RunTime:
         """Power-on of a run that switches the sensor, else the first pose."""
         start_time = datetime.fromisoformat(run.created)
-        on_s = (
-            MeasuredRun(record, run, next(iter(run.bench.get("sensors", {})), None)).power_on_s() if run.rows else 0.0
-        )
+        on_s = MeasuredRun(record, run, next(iter(run.batch), None)).power_on_s() if run.rows else 0.0
         first = next(record.kept(run.run), None)
         first_s = first.t_s if first is not None else 0.0
         if on_s or run.procedure == "soak":

@@ -267,18 +267,12 @@ def _calibration(record: Record, data: str, run: Run, model: Model) -> Calibrati
 
 def date_of(run: Run) -> datetime:
     """The date of the measurement. Raises DataError for an invalid constant `date`."""
-    stated_date = run.constants.get("date")
+    created, stated_date = datetime.fromisoformat(run.created), run.constants.get("date")
     try:
-        moment = (
-            datetime.fromisoformat(str(stated_date)) if stated_date is not None else datetime.fromisoformat(run.created)
-        )
+        moment = created if stated_date is None else datetime.fromisoformat(str(stated_date))
     except ValueError:
         raise DataError(f"run {run.run}: its constant date is {stated_date!r}; write it as 2025-03-01") from None
-    return (
-        moment
-        if moment.tzinfo
-        else moment.replace(hour=moment.hour or 12, tzinfo=datetime.fromisoformat(run.created).tzinfo)
-    )
+    return moment if moment.tzinfo else moment.replace(hour=moment.hour or 12, tzinfo=created.tzinfo)
 
 
 def run_date(run: Run) -> datetime:

@@ -143,12 +143,8 @@ def agree_on_rate(measured: float | None, stated_hz: float, source: str) -> floa
 MOST_MISSING = 0.1  # of a record, in gaps that are closed up
 WHOLE = 0.1  # of a step, by which steps may be off whole numbers of them where single samples were lost
 FEW_GAPS = 0.01  # of all steps
-EVEN_REMEDY = (
-    "record again with every sample at an even rate (interpolated samples have less white noise than the sensor)"
-)
-UNEVENNESS = (
-    1e-3  # of a record, by which times may be off an even row: those of a computer that samples reach in bursts
-)
+UNEVENNESS = 1e-3  # of a record, by which times may be off an even row, as where samples arrive in bursts
+EVEN_REMEDY = "record again with evenly spaced samples (interpolated samples have less white noise than the sensor)"
 
 
 def table_stream(table: Table, channel: str | None, rate_hz: float | None) -> Stream:

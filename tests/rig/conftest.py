@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 import yaml
@@ -42,6 +43,17 @@ class Ended:
     status: int
     out: str
     err: str
+
+    @property
+    def document(self) -> Any:
+        """What the command printed with `--json`."""
+        assert self.out, self.err
+        return json.loads(self.out)
+
+    def done(self) -> Ended:
+        """The same, of a command that must have succeeded."""
+        assert self.status == 0, self.err
+        return self
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -92,8 +91,8 @@ def test_a_fitted_model_is_evaluated_as_it_is(rig: Rig, data: str, tmp_path: Pat
     rig("discover", data, "--model", "linear", "--out", str(model))
     before = model.read_bytes()
     shifted = made(tmp_path / "shifted.csv", lambda z: 0.002 * z**2 + 0.01, seed=1)
-    again = json.loads(rig("compare", data, "--model", str(model), "--json").out)
-    other = json.loads(rig("compare", shifted, "--model", str(model), "--json").out)
+    again = rig("compare", data, "--model", str(model), "--json").document
+    other = rig("compare", shifted, "--model", str(model), "--json").document
     assert again["fails"] == []
     assert again["rmse"]["x"] < 60e-6
     assert other["rmse"]["x"] == pytest.approx(0.01, rel=0.02)
@@ -111,7 +110,7 @@ def test_data_without_any_noise_has_its_answer(rig: Rig, tmp_path: Path) -> None
     ended = rig(
         "discover", str(tmp_path / "exact.csv"), "--model", "linear", "--out", str(tmp_path / "m.yaml"), "--json"
     )
-    found = json.loads(ended.out)
+    found = ended.document
     assert (ended.status, found["verdict"], found["causes"]) == (0, "adequate", ["z-axis-bias"])
     values = [e.value for term in read_model(tmp_path / "m.yaml").terms for e in term.estimates]
     assert values == pytest.approx([2.5, 2.5, 1.0, 1.0, 0.002, 0.0], abs=1e-9)
@@ -120,7 +119,7 @@ def test_data_without_any_noise_has_its_answer(rig: Rig, tmp_path: Path) -> None
 def test_a_model_is_named_or_a_file(rig: Rig, data: str, tmp_path: Path) -> None:
     (tmp_path / "mine.yaml").write_text("schema: rig.model/1\nname: mine\neffects: [{effect: bias}]\n")
     for model in ("linear", "physical", str(tmp_path / "mine.yaml")):
-        found = json.loads(rig("compare", data, "--model", model, "--json").out)
+        found = rig("compare", data, "--model", model, "--json").document
         assert found["model"] == model
 
 
@@ -136,14 +135,14 @@ def test_an_effect_of_ones_own_is_shown_found_added_and_read_again(
 ) -> None:
     data, out = made(tmp_path / "sag.csv", lambda z: 0.003 * z**3), str(tmp_path / "sag.yaml")
     assert "sag: the proof mass sags" in rig("effects", "sag", *own).out
-    assert "sag" in {e["effect"] for e in json.loads(rig("effects", "--json", *own).out)["effects"]}
-    best = json.loads(rig("diagnose", data, "--model", "linear", "--json", *own).out)["candidates"][0]
+    assert "sag" in {e["effect"] for e in rig("effects", "--json", *own).document["effects"]}
+    best = rig("diagnose", data, "--model", "linear", "--json", *own).document["candidates"][0]
     assert best["effect"] == "sag"
-    found = json.loads(rig("discover", data, "--model", "linear", "--out", out, "--json", *own).out)
+    found = rig("discover", data, "--model", "linear", "--out", out, "--json", *own).document
     assert (found["verdict"], found["causes"]) == ("adequate", ["sag"])
     added = str(tmp_path / "added.yaml")
     assert rig("add", "sag", "--model", "linear", "--data", data, "--out", added, *own).status == 0
-    assert json.loads(rig("compare", data, "--model", added, "--json", *own).out)["fails"] == []
+    assert rig("compare", data, "--model", added, "--json", *own).document["fails"] == []
     ended = rig("compare", data, "--model", out)
     assert ended.status == 2
     assert 'sag.yaml: unknown effect "sag"' in ended.err

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -52,8 +51,8 @@ def test_an_eccentric_stage_is_found_until_its_error_table_is_given(rig: Rig, tm
     autocollimator(tmp_path)
     found = {}
     for name, beta in (("without", {}), ("with", {"error_table": "beta.csv"})):
-        run = json.loads(swept(rig, bench(tmp_path, **beta)).out)["run"]
-        found[name] = json.loads(rig("diagnose", run, "--json").out)
+        run = swept(rig, bench(tmp_path, **beta)).document["run"]
+        found[name] = rig("diagnose", run, "--json").document
     assert found["without"]["verdict"] == "effect-missing"
     assert found["without"]["candidates"][0]["effect"] == "stage-eccentricity"
     assert found["with"]["verdict"] == "adequate"
@@ -63,7 +62,7 @@ def test_an_eccentric_stage_is_found_until_its_error_table_is_given(rig: Rig, tm
 def test_what_was_commanded_stays_beside_the_true_angles(rig: Rig, tmp_path: Path) -> None:
     points = [[a, 0.2 * np.sin(np.radians(a)).item(), 0.004] for a in range(0, 360, 30)]
     file = bench(tmp_path, error_table=points)
-    run = json.loads(swept(rig, file, "--inclinations-deg", "90").out)["run"]
+    run = swept(rig, file, "--inclinations-deg", "90").document["run"]
     with Record() as record:
         table = table_of(record, run)
         kept = list(record.kept(run))

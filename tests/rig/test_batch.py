@@ -1,6 +1,5 @@
 """A batch: up to four sensors, eight axes, in one run; each gets its own calibration."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -68,8 +67,7 @@ def run(swept: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> str:
 @pytest.mark.parametrize("name", NAMES)
 def test_each_sensor_gets_its_own_calibration(rig: Call, run: str, tmp_path: Path, name: str) -> None:
     ended = rig("fit", f"{run}/{name}", "--model", "physical", "--out", str(tmp_path / "model.yaml"), "--json")
-    assert ended.status == 0, ended.err
-    found = {(p["effect"], p["name"]): p for p in json.loads(ended.out)["parameters"]}
+    found = {(p["effect"], p["name"]): p for p in ended.done().document["parameters"]}
     turned = found["axis-misalignment", "z"]
     assert turned["value"] == pytest.approx(-TURNED_DEG[name], abs=4 * turned["std"] + 0.01)
 
@@ -102,8 +100,7 @@ def test_results_carry_the_sensors_name(rig: Call, swept: tuple[Path, Path], tmp
     bench = tmp_path / "limited.yaml"
     bench.write_text(yaml.safe_dump(found))
     ended = rig("run", "noise-floor", "--duration-s", "20", "--bench", str(bench), "--unattended", "--json")
-    assert ended.status == 0, ended.err
-    results = json.loads(ended.out)["results"]
+    results = ended.done().document["results"]
     assert {f"{name}/noise-rms-{axis}" for name in NAMES for axis in "xy"} <= set(results)
     assert {results[f"{name}/noise-pp-x"]["verdict"] for name in NAMES} == {"pass"}
 
@@ -111,8 +108,7 @@ def test_results_carry_the_sensors_name(rig: Call, swept: tuple[Path, Path], tmp
 @pytest.mark.slow
 def test_a_search_goes_by_the_first_and_finds_all(rig: Call, swept: tuple[Path, Path]) -> None:
     ended = rig("run", "misalignment", "--dwell-s", "1", "--bench", str(swept[1]), "--unattended", "--json")
-    assert ended.status == 0, ended.err
-    results = json.loads(ended.out)["results"]
+    results = ended.done().document["results"]
     for name in NAMES:
         assert abs(results[f"{name}/beta-x"]["value"]) == pytest.approx(abs(TURNED_DEG[name]), abs=0.05)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -41,7 +40,7 @@ SWEEP = (
 @pytest.mark.sockets
 def test_a_run_gives_all_three_forms(rig: Rig, bench_file: Callable[..., Path], tmp_path: Path) -> None:
     file = str(bench_file(BENCH))
-    run = json.loads(rig(*SWEEP, "--bench", file).out)["run"]
+    run = rig(*SWEEP, "--bench", file).document["run"]
     ended = rig("certificate", run, "--model", "linear", "--out", str(tmp_path / "c"))
     assert ended.status == 1, ended.err  # the scale factor is beyond its limit
     assert "pass (over 99.9 %)" in ended.out
@@ -53,13 +52,13 @@ def test_a_run_gives_all_three_forms(rig: Rig, bench_file: Callable[..., Path], 
         assert f"written: {path}" in ended.out
         assert form == ".pdf" or text in path.read_text(encoding="utf-8")
     last = ("certificate", "last", "--model", "linear", "--out", str(tmp_path / "d.xml"))
-    document = json.loads(rig(*last, "--json").out)
+    document = rig(*last, "--json").document
     assert document["number"].startswith(run), "the number names the run, also where a command says `last`"
     assert document["schema"] == "rig.certificate/1"
     assert (document["serial"], document["customer"], document["laboratory"]["country"]) == ("17", "Somebody", "DE")
     assert {i["role"] for i in document["instruments"]} >= {"alpha", "adc", "hand level"}
     _check_that_samples_can_be_found(run, document)
-    listed = json.loads(rig("show", run, "--poses", "--json").out)["kept"]
+    listed = rig("show", run, "--poses", "--json").document["kept"]
     assert [pose["sha256"] for pose in listed] == [s["sha256"] for s in document["samples"]]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from datetime import date
 from pathlib import Path
@@ -49,7 +48,7 @@ def test_check_shows_what_is_due_and_fails_for_what_has_expired(rig: Rig, file: 
     assert ended.status == 1
     assert ended.out.endswith("beta: certificate CAL-17, due 2001-03-01\nd63 curve: certificate 42, due 2999-12-31\n")
     assert f"{MARK}; have it calibrated again" in ended.err
-    document = json.loads(rig("check", "--bench", file(OLD, GOOD), "--json").out)
+    document = rig("check", "--bench", file(OLD, GOOD), "--json").document
     assert document["certificates"]["d63 curve"] == {"number": "42", "due": "2999-12-31"}
     assert document["expired"] == [MARK]
     assert rig("check", "--bench", file(GOOD, GOOD)).status == 0
@@ -59,9 +58,9 @@ def test_check_shows_what_is_due_and_fails_for_what_has_expired(rig: Rig, file: 
 @pytest.mark.sockets
 def test_a_run_with_an_expired_one_is_marked_everywhere(rig: Rig, file: Callable[..., str], tmp_path: Path) -> None:
     ended = rig(*SWEEP, "--bench", file(OLD, GOOD), "--json")
-    document = json.loads(ended.out)
+    document = ended.document
     assert (ended.status, document["expired"]) == (0, MARK)
-    shown = json.loads(rig("show", document["run"], "--json").out)
+    shown = rig("show", document["run"], "--json").document
     assert shown["expired"] == shown["constants"]["expired"] == MARK
     assert [event["text"] for event in shown["events"] if event["what"] == "expired"] == [MARK]
     assert f"Remark: {MARK}." in rig("show", document["run"]).out
@@ -77,8 +76,8 @@ def test_a_run_with_an_expired_one_is_marked_everywhere(rig: Rig, file: Callable
 @pytest.mark.sockets
 def test_a_run_with_good_ones_says_nothing(rig: Rig, file: Callable[..., str]) -> None:
     ended = rig(*SWEEP, "--bench", file(GOOD, GOOD), "--json")
-    document = json.loads(ended.out)
+    document = ended.document
     assert document["expired"] is None
-    assert json.loads(rig("show", document["run"], "--json").out)["expired"] is None
+    assert rig("show", document["run"], "--json").document["expired"] is None
     assert "expired" not in rig(*SWEEP, "--bench", file(GOOD, GOOD)).out
     assert f"Remark: {MARK}." in rig(*SWEEP, "--bench", file(OLD, GOOD)).out

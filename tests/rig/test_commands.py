@@ -20,13 +20,13 @@ RUN = ("run", "sweep", "--unattended", *SMALL_ARGUMENTS)
 
 
 def the_run(rig: Rig) -> str:
-    return str(json.loads(rig(*RUN, "--json").out)["run"])
+    return str(rig(*RUN, "--json").document["run"])
 
 
 @pytest.mark.sockets
 def test_a_run_is_listed_and_shown(rig: Rig) -> None:
     ended = rig(*RUN, "--json")
-    document = json.loads(ended.out)
+    document = ended.document
     assert ended.status == 0
     assert {key: document[key] for key in ("schema", "procedure", "state", "poses", "results")} == {
         "schema": "rig.run/1",
@@ -35,9 +35,9 @@ def test_a_run_is_listed_and_shown(rig: Rig) -> None:
         "poses": POSES,
         "results": {},
     }
-    (listed,) = json.loads(rig("runs", "--json").out)["runs"]
+    (listed,) = rig("runs", "--json").document["runs"]
     assert (listed["run"], listed["state"], listed["poses"]) == (document["run"], "complete", POSES)
-    shown = json.loads(rig("show", document["run"], "--json").out)
+    shown = rig("show", document["run"], "--json").document
     assert shown["settings"]["step_deg"] == 90
     assert shown["columns"]["alpha_deg"] == {"min": 45, "max": 90}
     assert shown["identities"]["adc"]["model"] == "LabJack T7"
@@ -49,13 +49,13 @@ def test_a_run_is_listed_and_shown(rig: Rig) -> None:
 
 
 def test_an_empty_record_says_how_to_begin(rig: Rig) -> None:
-    assert json.loads(rig("runs", "--json").out) == {"schema": "rig.runs/1", "runs": []}
+    assert rig("runs", "--json").document == {"schema": "rig.runs/1", "runs": []}
     assert "rig run sweep" in rig("runs").out
 
 
 def test_settings_are_given_in_three_ways(rig: Rig) -> None:
     ways = (("--step-deg", "45"), ("--step-deg=45",), ("--set", "step_deg=45"))
-    plans = [json.loads(rig("plan", "sweep", *way, "--json").out) for way in ways]
+    plans = [rig("plan", "sweep", *way, "--json").document for way in ways]
     assert [plan["poses"] for plan in plans] == [7 * 9 * 2] * 3
 
 
@@ -80,7 +80,7 @@ def test_plan_prints_moves_limits_and_time(rig: Rig, rig_home: Path) -> None:
 
 def test_procedures_are_listed(rig: Rig) -> None:
     assert "sweep" in rig("procedures").out
-    document = json.loads(rig("procedures", "--json").out)
+    document = rig("procedures", "--json").document
     (sweep,) = [each for each in document["procedures"] if each["name"] == "sweep"]
     assert sweep["settings"]["step_deg"] == 10
     assert "Source" in sweep["doc"]
@@ -89,7 +89,7 @@ def test_procedures_are_listed(rig: Rig) -> None:
 @pytest.mark.sockets
 def test_check_identifies_and_tests_every_instrument(rig: Rig) -> None:
     ended = rig("check", "--json")
-    instruments = json.loads(ended.out)["instruments"]
+    instruments = ended.document["instruments"]
     assert ended.status == 0
     assert set(instruments) == set(read_bench().instruments)
     assert instruments["adc"]["identity"]["model"] == "LabJack T7"
@@ -118,7 +118,7 @@ def test_answers_come_from_a_file(rig: Rig, tmp_path: Path) -> None:
     answers = tmp_path / "answers.yaml"
     answers.write_text("mounting: no")
     ended = rig(*RUN, "--answers", str(answers), "--json")
-    run = json.loads(ended.out)
+    run = ended.document
     assert (ended.status, run["state"], run["poses"]) == (4, "stopped", 0)
     assert 'can its cable turn freely?" is no; correct this' in ended.err.lower()
     answers.write_text("mounting: yes")
@@ -137,7 +137,7 @@ def test_a_file_that_answers_nothing_is_refused(rig: Rig, tmp_path: Path, text: 
 def test_a_run_is_exported_as_the_table_that_analysis_reads(rig: Rig, tmp_path: Path) -> None:
     run = the_run(rig)
     ended = rig("export", run, "--out", str(tmp_path / "sweep.csv"), "--json")
-    assert json.loads(ended.out)["rows"] == POSES
+    assert ended.document["rows"] == POSES
     table = read_csv(tmp_path / "sweep.csv")
     assert table.kind == "poses"
     assert table.labels["path"][0] == "A+ to B-"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -34,7 +33,7 @@ def checks(
 def test_a_check_standard_is_measured_and_begins_its_baseline(rig: Rig) -> None:
     for _ in range(2):
         ended = rig("run", "check-standard", "--dwell-s", "1", "--unattended", "--json")
-    document = json.loads(ended.out)
+    document = ended.document
     results = document["results"]
     assert (ended.status, document["poses"], set(results)) == (0, 8, {"bias-x", "scale-x", "bias-y", "scale-y"})
     assert (results["bias-x"]["unit"], results["scale-x"]["unit"]) == ("V", "V/g")
@@ -53,7 +52,7 @@ def test_a_jump_is_out_of_control_and_named(rig: Rig) -> None:
     assert ended.status == 1
     assert f"{runs[11]}: CS-1 bias-x is +" in ended.out
     assert ended.out.endswith("out of control\n")
-    document = json.loads(rig("control", "CS-1", "--baseline", "10", "--json").out)
+    document = rig("control", "CS-1", "--baseline", "10", "--json").document
     (chart,) = document["charts"]
     assert (document["schema"], document["verdict"], chart["sensor"]) == ("rig.control/1", "out of control", "CS-1")
     assert {"chart": "individuals", "run": runs[11]} in chart["signals"]
@@ -78,13 +77,13 @@ def test_a_chart_belongs_to_one_sensor(rig: Rig) -> None:
     }
     checks([2.4, 2.4001], batch, "a1/bias-x")
     checks([2.3, 2.3001], batch, "a2/bias-x")
-    document = json.loads(rig("control", "--json").out)
+    document = rig("control", "--json").document
     assert [(chart["sensor"], len(chart["runs"])) for chart in document["charts"]] == [
         ("CS-1", 10),
         ("CS-2", 2),
         ("A2", 2),
     ]
-    assert len(json.loads(rig("control", "CS-2", "--json").out)["charts"]) == 1
+    assert len(rig("control", "CS-2", "--json").document["charts"]) == 1
 
 
 def test_its_pictures_are_files_of_each_sensor(rig: Rig, tmp_path: Path) -> None:
@@ -109,7 +108,7 @@ def test_a_standard_that_was_measured_once_keeps_no_other_from_its_chart(rig: Ri
     checks(QUIET)
     checks(QUIET[:1], ONE | {"sensor": {"name": "ADXL203", "serial": "CS-9"}})
     ended = rig("control", "--json")
-    assert {chart["sensor"] for chart in json.loads(ended.out)["charts"]} == {"CS-1"}
+    assert {chart["sensor"] for chart in ended.document["charts"]} == {"CS-1"}
 
 
 def test_control_gives_the_reason_if_there_is_no_chart(golden, rig: Rig) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -113,7 +112,7 @@ def _exists(path: str) -> bool:
 
 @pytest.mark.slow
 def test_the_demonstration_finds_what_was_hidden(rig: Callable[..., Any], tmp_path: Path) -> None:
-    document = json.loads(rig("demo", "--folder", str(tmp_path / "demo"), "--json").out)
+    document = rig("demo", "--folder", str(tmp_path / "demo"), "--json").document
     assert {row["fault"]: row["effect"] for row in document["hidden_faults"]} == SAME
     assert all(abs(row["found"] - row["size"]) < 4 * row["std"] for row in document["hidden_faults"])
     assert document["verdict"] == "adequate"
@@ -124,7 +123,7 @@ def test_the_demonstration_finds_what_was_hidden(rig: Callable[..., Any], tmp_pa
 
 @pytest.mark.slow
 def test_the_realistic_demonstration_tells_what_it_did_not_find(rig: Callable[..., Any], tmp_path: Path) -> None:
-    document = json.loads(rig("demo", "--realistic", "--folder", str(tmp_path / "demo"), "--json").out)
+    document = rig("demo", "--realistic", "--folder", str(tmp_path / "demo"), "--json").document
     rows = document["hidden_faults"]
     large = [row for row in rows if row["size_over_floor"] >= MATERIAL]
     assert len(large) > 12

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -105,7 +104,7 @@ def test_a_procedure_gives_its_results_in_the_unit_of_the_sensor(
     bench = digital(unit)
     ended = rig("run", procedure, "--bench", bench, "--unattended", "--json", *SHORT[procedure])
     assert ended.status in (0, 1), ended.err
-    results = json.loads(ended.out)["results"]
+    results = ended.document["results"]
     for name, result in results.items():
         assert result["unit"] not in ("V", "V/g", "V/K", "V/h"), name
         assert not (expected := unit_expected(name, unit)) or result["unit"] in expected, name
@@ -124,7 +123,7 @@ def test_a_procedure_runs_with_each_digital_sensor(
 ) -> None:
     ended = rig("run", procedure, "--bench", framed(driver), "--unattended", "--json", *SHORT[procedure])
     assert ended.status in (0, 1), ended.err
-    results = json.loads(ended.out)["results"]
+    results = ended.document["results"]
     unit, field = FRAMED[driver]
     for name, result in results.items():
         assert result["unit"] not in ("V", "V/g", "V/K", "V/h"), name
@@ -212,7 +211,7 @@ def test_table_model_and_noise_have_the_unit_of_the_sensor(
     assert not VOLTS.search(fitted.out)
     assert yaml.safe_load(model.read_text(encoding="utf-8"))["unit"] == "count"
     assert " count " in rig("compare", "last", "--model", str(model)).out
-    poses = json.loads(rig("show", "last", "--poses", "--json").out)["kept"]
+    poses = rig("show", "last", "--poses", "--json").document["kept"]
     assert set(poses[0]["means_v"]) == {"supply", "d63"}
     assert set(poses[0]["means"]) == {"ax", "ay", "az"}
     assert poses[0]["units"] == {"ax": "count", "ay": "count", "az": "count"}

@@ -31,7 +31,7 @@ def test_it_collects_versions_checks_runs_and_the_last_runs_log(rig: Callable[..
         record.set_state(run, "failed", "alpha: stands still")
     archive = tmp_path / "doctor.zip"
     ended = rig("doctor", "--out", str(archive), "--json")
-    document = json.loads(ended.out)
+    document = ended.document
     assert (ended.status, document["schema"]) == (0, "rig.doctor/1")
     assert all(check["ok"] for check in document["checks"].values())
     with zipfile.ZipFile(archive) as file:
@@ -47,7 +47,7 @@ def test_without_any_run_all_checks_pass(rig: Callable[..., Any], tmp_path: Path
     ended = rig("doctor", "--out", str(tmp_path / "doctor.zip"))
     assert (ended.status, "there is no run yet" in ended.out) == (0, True)
     ended = rig("doctor", "--out", str(tmp_path / "again.zip"), "--json")
-    assert (ended.status, all(check["ok"] for check in json.loads(ended.out)["checks"].values())) == (0, True)
+    assert (ended.status, all(check["ok"] for check in ended.document["checks"].values())) == (0, True)
 
 
 @pytest.mark.parametrize("package", ["numpy", "sqlalchemy", "yaml"])
@@ -115,7 +115,7 @@ def test_of_a_damaged_record_is_read_what_can_be_and_what_is_lost_is_said(
     checked = rig("doctor", "--out", str(tmp_path / "doctor.zip"))
     assert (checked.status, "WRONG  damaged: " in checked.out) == (1, True)
     ended = rig("doctor", "--recover", str(tmp_path / "new"), "--json")
-    told = json.loads(ended.out)
+    told = ended.document
     assert ended.status == 1
     assert told["lost"]
     found = _kept(tmp_path / "new", run)

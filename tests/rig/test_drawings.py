@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable
 from itertools import product
@@ -109,7 +108,7 @@ def test_the_command_writes_the_file_and_says_what_the_sensor_feels(rig: Rig, tm
     assert ended.status == 0
     assert out.read_text() == page(Attitude(45, 90))
     assert "in g: x +0.0000, y +0.7071, z +0.7071" in ended.out
-    document = json.loads(rig("draw", "--alpha", "90", "--flip", "1", "--json").out)
+    document = rig("draw", "--alpha", "90", "--flip", "1", "--json").document
     assert document["specific_force_g"] == {"x": 1.0, "y": 0.0, "z": 0.0}
     assert "o: pin 1" in rig("draw").out
 

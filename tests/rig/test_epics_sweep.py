@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -30,7 +29,7 @@ def swept(rig: Callable[..., Any], tmp_path: Path, adc: dict[str, Any], **stages
     assert rig("check", "--bench", str(file)).status == 0
     ended = rig("run", "sweep", "--bench", str(file), *SWEEP, "--answers", str(answers))
     assert ended.status == 0, ended.err
-    document = json.loads(rig("fit", "last", "--model", "linear", "--json").out)
+    document = rig("fit", "last", "--model", "linear", "--json").document
     return [p["value"] for p in document["parameters"] if "scale" in p["name"]]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -26,7 +25,7 @@ NOISE = ("run", "noise-floor", "--duration-s", "3", "--block-s", "1", "--dwell-s
 @pytest.fixture
 def run(rig: Rig) -> str:
     """A small noise floor: poses 0 to 3 at +-1 g, 4 to 6 the still record."""
-    return str(json.loads(rig(*NOISE).out)["run"])
+    return str(rig(*NOISE).document["run"])
 
 
 def results(run: str) -> dict[str, Any]:
@@ -42,7 +41,7 @@ def events(run: str) -> list[tuple[str, str]]:
 def test_results_are_those_of_the_other_poses_and_come_back(rig: Rig, run: str) -> None:
     before = results(run)
     ended = rig("exclude", run, "5", "--reason", "a lorry passed", "--json")
-    document = json.loads(ended.out)
+    document = ended.document
     assert ended.status == 0
     assert {k: document[k] for k in ("schema", "run", "pose", "excluded")} == {
         "schema": "rig.exclude/1",
@@ -53,7 +52,7 @@ def test_results_are_those_of_the_other_poses_and_come_back(rig: Rig, run: str) 
     assert document["results"] == results(run) != before
     assert ("pose 5 excluded", "a lorry passed") in events(run)
     assert (RESULTS, "evaluated again") in events(run)
-    assert json.loads(rig("exclude", run, "5", "--include", "--json").out)["excluded"] is None
+    assert rig("exclude", run, "5", "--include", "--json").document["excluded"] is None
     assert results(run) == before
 
 
@@ -88,8 +87,8 @@ def test_even_without_any_pose_it_can_be_shown(rig: Rig) -> None:
         run = start(record, *_small()).run.run
         for number in range(POSES):
             exclude(record, run, [number], "all wrong")
-    assert json.loads(rig("show", run, "--json").out)["columns"] == {}
-    assert len(json.loads(rig("show", run, "--poses", "--json").out)["kept"]) == POSES
+    assert rig("show", run, "--json").document["columns"] == {}
+    assert len(rig("show", run, "--poses", "--json").document["kept"]) == POSES
 
 
 def _small() -> tuple[Any, ...]:
@@ -153,7 +152,7 @@ def imported(rig: Rig, tmp_path: Path) -> str:
     """An imported table of four poses, the third with a wrong output."""
     file = tmp_path / "four.csv"
     file.write_text("alpha_deg,beta_deg,vx_v,path\n90,0,3.5,a\n90,90,2.5,b\n90,180,9.9,c\n90,270,2.5,d\n")
-    return str(json.loads(rig("import", str(file), "--json").out)["run"])
+    return str(rig("import", str(file), "--json").document["run"])
 
 
 def test_a_row_of_an_imported_table_is_left_out_and_comes_back(rig: Rig, imported: str) -> None:
@@ -164,7 +163,7 @@ def test_a_row_of_an_imported_table_is_left_out_and_comes_back(rig: Rig, importe
         rest = table_of(record, imported)
         assert (list(rest.column("vx_v")), rest.labels["path"]) == ([3.5, 2.5, 2.5], ("a", "b", "d"))
         assert list(rest.numbered(np.arange(3))) == [0, 1, 3]
-    shown = json.loads(rig("show", imported, "--poses", "--json").out)
+    shown = rig("show", imported, "--poses", "--json").document
     assert shown["columns"]["vx_v"]["max"] == 3.5
     assert [row["excluded"] for row in shown["kept"]] == [None, None, "bumped", None]
     assert "2     c     90         180       9.9   bumped" in rig("show", imported, "--poses").out
@@ -191,7 +190,7 @@ def test_without_any_row_an_imported_table_names_the_way_back(rig: Rig, imported
 def test_a_single_sample_of_an_imported_record_cannot_be_left_out(rig: Rig, tmp_path: Path) -> None:
     file = tmp_path / "still.csv"
     file.write_text("t_s,vx_v\n" + "".join(f"{k / 10},{2.5 + k % 3 / 1000}\n" for k in range(40)))
-    run = json.loads(rig("import", str(file), "--kind", "still", "--json").out)["run"]
+    run = rig("import", str(file), "--kind", "still", "--json").document["run"]
     ended = rig("exclude", run, "3", "--reason", "x")
     assert ended.status == 2
     assert "is an imported table of still: its rows are samples" in ended.err

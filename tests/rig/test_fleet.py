@@ -64,8 +64,7 @@ def discovered(
     address = cluster.scheduler_address
     ended = rig("fleet", "discover", str(folder), "--scheduler", address, "--force", "--out", str(home / "guide"),
                 "--report", str(home / "fleet.html"), "--json")  # fmt: skip
-    assert ended.status == 0, ended.err
-    return dict(json.loads(ended.out))
+    return ended.done().document
 
 
 def test_the_rig_in_error_and_the_strange_sensor_are_found_and_bad_files_are_listed(
@@ -102,7 +101,7 @@ def test_calibrate_goes_by_the_discovered_models_and_writes_each_sensors(
     address = cluster.scheduler_address
     ended = rig("fleet", "calibrate", str(folder), "--scheduler", address, "--model", str(home / "guide"),
                 "--out", str(home / "models"), "--report", str(home / "calibrated.html"), "--json")  # fmt: skip
-    document = json.loads(ended.out)
+    document = ended.document
     (batch,) = document["batches"]
     assert len(batch["sensors"]) == 12
     assert {each["sensor"] for each in document["failed"]} == {"BAD", "GONE"}

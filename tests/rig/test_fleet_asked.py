@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -75,11 +74,11 @@ def test_a_users_own_effects_are_asked_for_and_sent_to_the_workers(
     common = (str(data), "--scheduler", cluster.scheduler_address, "--json")
     guide = str(tmp_path / "guide")
     found = rig("fleet", "discover", *common, "--bench", str(bench), "--out", guide)
-    assert [e["effect"] for e in json.loads(found.out)["batches"][0]["effects"]] == ["ripple"]
+    assert [e["effect"] for e in found.document["batches"][0]["effects"]] == ["ripple"]
     assert found.err.count("are run") <= 1
     ended = rig("fleet", "calibrate", *common, "--bench", str(bench), "--model", guide,
                 "--report", str(tmp_path / "page.html"))  # fmt: skip
-    waves = {n["name"]: n["mean"] for n in json.loads(ended.out)["batches"][0]["population"] if n["effect"] == "ripple"}
+    waves = {n["name"]: n["mean"] for n in ended.document["batches"][0]["population"] if n["effect"] == "ripple"}
     assert waves == {"wave": pytest.approx(5e-5, rel=0.1)}
     assert rig("fleet", "calibrate", *common, "--model", guide).status == 2
 

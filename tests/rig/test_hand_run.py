@@ -64,8 +64,7 @@ def bench_with(tmp_path: Path) -> Callable[..., Path]:
 @pytest.mark.sockets
 def test_a_run_finds_zeros_gains_and_angles(rig: Rig, rig_home: Path) -> None:
     ended = rig(*RUN)
-    assert ended.status == 0, ended.err
-    found = json.loads(ended.out)["results"]
+    found = ended.done().document["results"]
     world = world_of(read_bench(HAND))
     assert isinstance(world, HandheldWorld)
     for axis in "xyz":
@@ -74,7 +73,7 @@ def test_a_run_finds_zeros_gains_and_angles(rig: Rig, rig_home: Path) -> None:
             assert abs(found[name]["value"] - true) < 4 * found[name]["std"] + 3e-5  # the gains go with the cosines
     assert found["uncertainty"]["value"] < 1e-3
     assert rig("compare", "last", "--model", "linear", "--json").status == 0
-    verdict = json.loads(rig("diagnose", "last", "--json").out)
+    verdict = rig("diagnose", "last", "--json").document
     assert verdict["verdict"] in ("effect-missing", "ambiguous")  # common-scale has one gain for all axes
 
 
@@ -85,8 +84,7 @@ FIELDS_RUN = ("run", "hand-fields", "--bench", str(HAND), "--unattended", "--jso
 @pytest.mark.sockets
 def test_a_run_finds_hard_and_soft_iron(rig: Rig, rig_home: Path) -> None:
     ended = rig(*FIELDS_RUN)
-    assert ended.status == 0, ended.err
-    found = json.loads(ended.out)["results"]
+    found = ended.done().document["results"]
     world = world_of(read_bench(HAND))
     assert isinstance(world, HandheldWorld)
     hard_iron, gains = true_ellipsoid(world)
@@ -94,9 +92,9 @@ def test_a_run_finds_hard_and_soft_iron(rig: Rig, rig_home: Path) -> None:
     assert [found[f"hard-iron-{axis}"]["value"] for axis in "xyz"] == pytest.approx(hard_iron, abs=2e-3 * strength)
     assert found["field-total"]["value"] == pytest.approx(strength, rel=2e-3)
     assert found["uncertainty"]["value"] < 0.2
-    verdict = json.loads(rig("diagnose", "last", "--json").out)
+    verdict = rig("diagnose", "last", "--json").document
     assert {"hard-iron"} <= {candidate["effect"] for candidate in verdict["candidates"]}
-    searched = json.loads(rig("discover", "last", "--json").out)
+    searched = rig("discover", "last", "--json").document
     assert searched["causes"] == ["hard-iron", "soft-iron"]
 
 
@@ -111,7 +109,7 @@ def test_a_disturbed_field_is_a_result_that_is_missing(
     assert ended.status == 1
     assert "the magnitude of the field differs by" in ended.err
     assert "rig exclude" in ended.err
-    assert json.loads(ended.out)["results"].keys() >= {"hard-iron-x", "left-by-ellipsoid"}
+    assert ended.document["results"].keys() >= {"hard-iron-x", "left-by-ellipsoid"}
     assert rig("diagnose", "last", "--json").status == 0  # nothing is lost
 
 
@@ -124,8 +122,7 @@ def test_a_run_finds_the_scale_factors_and_the_misalignment_of_a_gyroscope(
     rig: Rig, rig_home: Path, tmp_path: Path
 ) -> None:
     ended = rig(*TURNS_RUN)
-    assert ended.status == 0, ended.err
-    found = json.loads(ended.out)["results"]
+    found = ended.done().document["results"]
     world = world_of(read_bench(HAND))
     assert isinstance(world, HandheldWorld)
     true = true_gyroscope(world)
@@ -133,14 +130,14 @@ def test_a_run_finds_the_scale_factors_and_the_misalignment_of_a_gyroscope(
         assert found[f"gyro-scale-{axis}"]["value"] == pytest.approx(true.gains[k], rel=2e-3)
         assert found[f"gyro-bias-{axis}"]["value"] == pytest.approx(true.b[k], abs=1e-4)
     assert found["uncertainty"]["value"] < 0.2
-    verdict = json.loads(rig("diagnose", "last", "--json").out)
+    verdict = rig("diagnose", "last", "--json").document
     assert verdict["candidates"][0]["effect"] == "gyro-misalignment"
-    searched = json.loads(rig("discover", "last", "--json").out)
+    searched = rig("discover", "last", "--json").document
     assert (searched["verdict"], searched["causes"]) == ("adequate", ["gyro-misalignment"])
     exported = tmp_path / "turns.csv"
     assert rig("export", "last", "--format", "csv", "--out", str(exported)).status == 0
-    again = json.loads(rig("fit", str(exported), "--model", "gyroscope", "--json").out)
-    fitted = json.loads(rig("fit", "last", "--model", "gyroscope", "--json").out)
+    again = rig("fit", str(exported), "--model", "gyroscope", "--json").document
+    fitted = rig("fit", "last", "--model", "gyroscope", "--json").document
     values = [[p["value"] for p in document["parameters"]] for document in (again, fitted)]
     assert values[0] == pytest.approx(values[1], rel=1e-6)
     assert rig("report", "last", "--model", "gyroscope", "--out", str(tmp_path / "report.html")).status == 0
@@ -224,7 +221,7 @@ def test_an_accuracy_that_was_not_reached_is_a_result_that_is_missing(rig: Rig, 
     ended = rig(*RUN, "--target-g", "1e-6", "--most-positions", "12")
     assert ended.status == 1
     assert "mg only, wanted 0.001 mg; take more positions, or longer rests" in ended.err
-    assert "uncertainty" not in json.loads(ended.out)["results"]
+    assert "uncertainty" not in ended.document["results"]
 
 
 @pytest.mark.parametrize(("percent", "is_reached"), [(0.19, True), (0.201, True), (0.23, True), (0.25, False)])
@@ -267,8 +264,7 @@ def test_a_digital_sensor_is_calibrated_in_its_own_unit(rig: Rig, rig_home: Path
     digital_bench = tmp_path / "digital.yaml"
     digital_bench.write_text(yaml.safe_dump(document), encoding="utf-8")
     ended = rig("run", "hand-positions", "--bench", str(digital_bench), "--unattended", "--json")
-    assert ended.status == 0, ended.err
-    found = json.loads(ended.out)["results"]
+    found = ended.done().document["results"]
     world = world_of(read_bench(digital_bench))
     assert isinstance(world, HandheldWorld)
     for axis in "xyz":
@@ -299,8 +295,7 @@ def test_a_digital_unit_is_calibrated_in_its_own_units(
     path = tmp_path / "digital.yaml"
     path.write_text(yaml.safe_dump(document), encoding="utf-8")
     ended = rig("run", procedure, "--bench", str(path), "--unattended", "--json")
-    assert ended.status == 0, ended.err
-    assert json.loads(ended.out)["results"][found_name]["unit"] == unit
+    assert ended.done().document["results"][found_name]["unit"] == unit
 
 
 def test_a_digital_sensor_records_the_outputs_of_two_sensors_for_who_asks() -> None:

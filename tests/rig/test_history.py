@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, date, datetime, timedelta
@@ -34,7 +33,7 @@ def years() -> None:
 
 def test_a_single_calibration_has_no_drift(rig: Rig, years: None) -> None:
     assert rig("history", "18").out.startswith("18: one calibration, 2024-03-02, model linear\n")
-    said = json.loads(rig("history", "18", "--json").out)
+    said = rig("history", "18", "--json").document
     assert len(said["calibrations"]) == 1
     assert {q["drift_per_year"] for q in said["quantities"]} == {None}
 
@@ -51,7 +50,7 @@ def test_the_history_of_a_sensor_is_printed(rig: Rig, years: None, tmp_path: Pat
 
 
 def test_the_document_of_a_history_has_its_figures(rig: Rig, years: None) -> None:
-    said = json.loads(rig("history", "17", "--limit", "bias-x=0.005", "--baseline", "3", "--json").out)
+    said = rig("history", "17", "--limit", "bias-x=0.005", "--baseline", "3", "--json").document
     assert said["schema"] == "rig.history/1"
     bias = next(q for q in said["quantities"] if q["name"] == "bias-x")
     assert bias["drift_per_year"] == pytest.approx(0.001, rel=0.03)
@@ -129,13 +128,13 @@ def test_a_run_of_a_batch_is_a_calibration_of_each_sensor(rig: Rig, bench_file: 
     sweep = ("--inclinations-deg", "90,30", "--step-deg", "90", "--dwell-s", "0.2", "--unattended")
     assert rig("run", "sweep", *sweep, "--bench", str(file)).status == 0
     for serial, member in (("17", "a1"), ("18", "a2")):
-        (only,) = json.loads(rig("history", serial, "--json").out)["calibrations"]
+        (only,) = rig("history", serial, "--json").document["calibrations"]
         assert only["data"].endswith(f"/{member}")
         assert only["rig"] == "the rig in the cellar"
 
 
 def test_a_run_leads_to_the_life_of_its_sensor(rig: Rig, years: None) -> None:
-    shown = {run["run"]: rig("show", run["run"]).out for run in json.loads(rig("runs", "--json").out)["runs"]}
+    shown = {run["run"]: rig("show", run["run"]).out for run in rig("runs", "--json").document["runs"]}
     assert sum("The record has 5 runs of the sensor 17: rig history 17" in text for text in shown.values()) == 5
     assert sum("rig history 18" in text for text in shown.values()) == 0  # one run makes no life
 
@@ -166,7 +165,7 @@ def test_runs_of_one_day_have_no_drift_a_year(rig: Rig) -> None:
     for hour in (8, 12, 16):
         calibrated("17", f"2020-03-01T{hour:02}:00", 2.5 + 0.001 * hour, seed=hour)
     ended = rig("history", "17", "--limit", "bias-x=0.005", "--json")
-    said = json.loads(ended.out)
+    said = ended.document
     assert len(said["calibrations"]) == 3
     assert {q["drift_per_year"] for q in said["quantities"]} == {None}
     assert (

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -44,16 +42,11 @@ def reader(people: Server, database: str, monkeypatch: pytest.MonkeyPatch) -> st
     return people.url(database, "anna")
 
 
-def said(ended: Ended) -> Any:
-    assert ended.status == 0, ended.err
-    return json.loads(ended.out)
-
-
 def test_an_imported_table_reads_the_same_from_the_lab(
     rig: Rig, work: Path, writer: str, reader: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    table = said(rig("import", "good.csv", "--kind", "poses", "--constant", "serial=17", "--json"))["run"]
-    assert len(said(rig("push", "--to", writer, "--json"))["runs"]) == 1
+    table = rig("import", "good.csv", "--kind", "poses", "--constant", "serial=17", "--json").done().document["run"]
+    assert len(rig("push", "--to", writer, "--json").done().document["runs"]) == 1
     asked: Mapping[str, tuple[str, ...]] = {
         "runs": (),
         "show": (table,),
@@ -66,7 +59,7 @@ def test_an_imported_table_reads_the_same_from_the_lab(
     exported = (work / "x.csv").read_bytes()
     monkeypatch.setenv("RIG_HOME", str(work / "elsewhere"))
     for name, words in asked.items():
-        assert said(rig(name, *words, "--json", "--record", reader)) == said(own[name]), name
+        assert rig(name, *words, "--json", "--record", reader).done().document == own[name].done().document, name
     assert (work / "x.csv").read_bytes() == exported
     monkeypatch.setenv(RECORD, reader)
     assert [run.run for run in runs_of_workbench()] == [table]
@@ -122,7 +115,7 @@ def test_a_rig_that_is_offline_goes_on_and_catches_up(
     away = f"postgresql://rig7@127.0.0.1:{free_port()}/rigs"
     bench = str(bench_file({"lab": {"url": away, "push": True}}))
     ended = rig(*SWEEP, "--bench", bench, "--json")
-    run = said(ended)["run"]
+    run = ended.done().document["run"]
     assert f"not pushed: {away}: no connection to the lab's record (connection" in ended.err
     assert "nothing is lost, the next `rig push` continues" in ended.err
     assert rig("push", "--bench", bench).status == 2
@@ -138,9 +131,9 @@ def test_a_rig_that_is_offline_goes_on_and_catches_up(
 def test_a_run_of_another_lab_is_resumed_at_home(rig: Rig, writer: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where runs are made, the lab is not asked, whatever the environment says."""
     monkeypatch.setenv(RECORD, writer)
-    run = said(rig(*SWEEP, "--json"))["run"]
-    assert said(rig("resume", run, "--json"))["state"] == "complete"
-    assert said(rig("runs", "--json"))["runs"] == []
+    run = rig(*SWEEP, "--json").done().document["run"]
+    assert rig("resume", run, "--json").done().document["state"] == "complete"
+    assert rig("runs", "--json").done().document["runs"] == []
 
 
 def test_a_password_is_stored_and_printed_nowhere(
@@ -191,7 +184,7 @@ def test_a_database_is_prepared_once_and_brought_up_to_date(server: Server, rig:
     name = server.new_database()
     url = server.url(name)
     assert "there is no record yet; `rig push --prepare --to URL`" in rig("runs", "--record", url).err
-    assert said(rig("push", "--prepare", "--to", url, "--json"))["before"] == 0
+    assert rig("push", "--prepare", "--to", url, "--json").done().document["before"] == 0
     assert "CREATE ROLE rig7 LOGIN PASSWORD '...' IN ROLE rig_writer" in rig("push", "--prepare", "--to", url).out
     with Record() as own, Record(lab_url(url)) as lab:
         run = a_run(own)
@@ -215,7 +208,7 @@ def test_verify_says_what_has_changed(rig: Rig, server: Server, database: str) -
     assert rig("push", "--verify", "--to", url).out == "1 runs unchanged, 0 incomplete\n"
     rig("exclude", run, "3", "--reason", "no", "--record", url)
     ended = rig("push", "--verify", "--to", url, "--json")
-    assert (ended.status, json.loads(ended.out)["changed"]) == (1, [run])
+    assert (ended.status, ended.document["changed"]) == (1, [run])
 
 
 def test_a_cut_connection_to_the_lab_gives_one_message(server: Server, database: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -96,7 +95,7 @@ def test_an_empty_record_has_no_last_run(golden) -> None:
     ids=lambda command: command[0],
 )
 def test_commands_take_the_last_run(rig: Callable[..., Ended], work: Path, command: tuple[str, ...]) -> None:
-    run = json.loads(rig("import", "good.csv", "--kind", "poses", "--json").out)["run"]
+    run = rig("import", "good.csv", "--kind", "poses", "--json").document["run"]
     named, last = (rig(*command, data, "--json") for data in (run, "last"))
     assert named.status == last.status
     assert last.out.replace('"last"', f'"{run}"') == named.out

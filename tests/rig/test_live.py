@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -55,8 +54,7 @@ def test_the_cause_is_found_in_less_rig_time_than_the_standard_sweep(
 ) -> None:
     out = str(tmp_path / "found.yaml")
     ended = rig("discover", "--live", "--bench", bench(world), "--unattended", "--out", out, "--json")
-    assert ended.status == 0, ended.err
-    found = json.loads(ended.out)
+    found = ended.done().document
     assert (found["schema"], found["verdict"], found["causes"]) == ("rig.discovery/1", "adequate", [cause])
     assert found["stands"]
     assert found["rig_time_s"] < found["standard_rig_time_s"] / 2
@@ -67,7 +65,7 @@ def test_the_cause_is_found_in_less_rig_time_than_the_standard_sweep(
         assert all(record.run(run).state == "complete" for run in found["runs"])
     ends = [table.time_s.max() for table in tables[:-1]]
     assert all(table.time_s.min() > end for table, end in zip(tables[1:], ends, strict=True))
-    again = json.loads(rig("discover", *found["runs"], "--json").out)
+    again = rig("discover", *found["runs"], "--json").document
     assert (again["verdict"], again["causes"]) == (found["verdict"], found["causes"])
     assert f"{found['runs'][0]}: 54 poses in " in ended.err
     assert "Next, " in ended.err

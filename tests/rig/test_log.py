@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -66,8 +65,8 @@ def test_a_run_tells_what_it_did_what_stopped_it_and_that_it_went_on(rig: Callab
 def test_every_message_is_logged_on_request_and_shown(rig: Callable[..., Any], bench_file: Callable[..., Path]) -> None:
     small = ("--step-deg", "180", "--dwell-s", "0.1", "--inclinations-deg", "90")
     ended = rig("run", "sweep", *small, "--unattended", "--json", "--trace")
-    run = json.loads(ended.out)["run"]
-    log = json.loads(rig("show", run, "--log", "--json").out)["log"]
+    run = ended.document["run"]
+    log = rig("show", run, "--log", "--json").document["log"]
     sent, heard = ([line for line in log if line["what"] == way] for way in ("sent", "heard"))
     assert len(sent) > 100
     assert len(heard) > 100

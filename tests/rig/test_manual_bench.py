@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -53,7 +52,7 @@ def test_the_simulated_technician_makes_the_whole_sweep(rig: Rig, file: Callable
     ended = rig("run", "sweep", *SMALL, "--bench", file(manual()), "--unattended", "--json")
     assert ended.status == 0
     with Record() as record:
-        run = json.loads(ended.out)["run"]
+        run = ended.document["run"]
         table, events = table_of(record, run), [event.what for event in record.events(run)]
         levels = {reading.name: reading.value for reading in record.readings(run)}
     off = table.column("beta_deg") - table.column("beta_set_deg")
@@ -75,7 +74,7 @@ def test_what_a_script_reads_off_the_dial_counts(rig: Rig, file: Callable[..., s
     answers = file({"mounting": True, "alpha-90": "yes", "beta-90": "90.083", "beta-180": 180}, "answers.yaml")
     ended = rig("run", "sweep", *SMALL, "--bench", file(manual()), "--answers", answers, "--unattended", "--json")
     with Record() as record:
-        table = table_of(record, json.loads(ended.out)["run"])
+        table = table_of(record, ended.document["run"])
     read = table.column("beta_deg")[table.column("beta_set_deg") == 90]
     np.testing.assert_array_equal(read, [90.083, 90.083])
     np.testing.assert_array_equal(table.column("alpha_deg"), 90.0)
@@ -98,7 +97,7 @@ def test_where_nobody_turns_a_real_stage_the_run_stops_and_goes_on_later(rig: Ri
     settings = ("--inclinations-deg", "90", "--step-deg", "180", "--dwell-s", "0.01", "--settle-s", "0")
     answers = file({"mounting": "yes"}, "few.yaml")
     ended = rig("run", "sweep", *settings, "--bench", bench, "--answers", answers, "--unattended", "--json")
-    document = json.loads(ended.out)
+    document = ended.document
     assert (ended.status, document["state"], document["poses"]) == (4, "stopped", 0)
     assert (
         'the question "Turn alpha to 90 deg. What does its dial show?" has no answer; write `alpha-90: ...`'
@@ -106,7 +105,7 @@ def test_where_nobody_turns_a_real_stage_the_run_stops_and_goes_on_later(rig: Ri
     )
     asked = {f"beta-{deg}": "yes" for deg in (-5, 0, 180, 360, 365)} | {"alpha-90": "90.083", "beta-dial": 0}
     ended = rig("resume", document["run"], "--answers", file(asked, "all.yaml"), "--unattended", "--json")
-    assert (ended.status, json.loads(ended.out)["poses"]) == (0, 6)
+    assert (ended.status, ended.document["poses"]) == (0, 6)
     with Record() as record:
         np.testing.assert_array_equal(table_of(record, document["run"]).column("alpha_deg"), 90.083)
 

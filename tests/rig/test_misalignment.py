@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -33,7 +32,7 @@ def test_known_axes_are_found_within_0_02_deg(rig: Rig, tmp_path: Path) -> None:
     file = tmp_path / "bench.yaml"
     file.write_text(yaml.safe_dump(document))
     ended = rig("run", "misalignment", "--dwell-s", "2", "--bench", str(file), "--unattended", "--json")
-    results = json.loads(ended.out)["results"]
+    results = ended.document["results"]
     assert set(results) <= set(names_with_limits())
     axes = {axis: np.array([results[f"theta-{axis}{r}"]["value"] for r in "xyz"]) for axis in "xy"}
     # the package is turned about x, y, z in turn; its y beam leans to its x beam

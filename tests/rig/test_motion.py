@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import islice, pairwise
@@ -276,11 +275,11 @@ def test_a_sensor_turned_on_its_mount_is_found_by_the_axis_that_should_not_move(
 def test_every_command_takes_a_motion_run(rig: Callable[..., Any], tmp_path: Path) -> None:
     arguments = [part for name, value in BRIEF.items() for part in (f"--{name.replace('_', '-')}", value)]
     ended = rig("run", "motion", *arguments, "--unattended", "--json")
-    document = json.loads(ended.out)
+    document = ended.document
     assert (ended.status, document["procedure"], document["state"]) == (0, "motion", "complete")
     run = document["run"]
     model, page, csv = (str(tmp_path / name) for name in ("model.yaml", "page.html", "run.csv"))
-    assert json.loads(rig("compare", run, "--json").out)["model"] == "linear"
+    assert rig("compare", run, "--json").document["model"] == "linear"
     assert rig("add", "output-filter", "--model", "linear", "--data", run, "--out", model).status == 0
     assert "output-filter" in Path(model).read_text()
     assert rig("export", run, "--out", csv).status == 0

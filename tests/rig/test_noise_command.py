@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,11 +22,6 @@ Rig = Callable[..., Ended]
 PROCESSES = {
     "white-noise", "flicker-noise", "rate-random-walk", "quantisation-noise", "sinusoidal-noise", "gauss-markov-noise",
 }  # fmt: skip
-
-
-def document(ended: Ended) -> dict[str, Any]:
-    assert ended.status == 0, ended.err
-    return dict(json.loads(ended.out))
 
 
 def samples(n: int = 6000) -> np.ndarray:
@@ -54,7 +47,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize("kind", ["f8", "f4", "i4"])
 def test_the_document_of_an_array(rig: Rig, folder: Path, kind: str) -> None:
     np.save("some.npy", (samples() * 1000).astype(kind))
-    said = document(rig("noise", "some.npy", "--rate", "50", "--json"))
+    said = rig("noise", "some.npy", "--rate", "50", "--json").done().document
     assert {"schema", "rate_hz", "n", "allan", "coefficients"} <= set(said)
     assert (said["schema"], said["rate_hz"], said["n"]) == ("rig.noise/1", 50.0, 6000)
     assert set(said["allan"]) == {"tau_s", "deviation", "low", "high"}
@@ -71,7 +64,7 @@ def test_the_document_of_an_array(rig: Rig, folder: Path, kind: str) -> None:
 
 
 def test_other_deviations_and_the_spectrum_have_intervals(rig: Rig, folder: Path) -> None:
-    said = document(rig("noise", "still.npy", "--rate", "50", "--json"))
+    said = rig("noise", "still.npy", "--rate", "50", "--json").done().document
     assert set(said["deviations"]) == {"modified", "hadamard", "total"}
     for curve in said["deviations"].values():
         assert set(curve) == {"tau_s", "deviation", "low", "high"}
@@ -115,7 +108,7 @@ def test_what_is_no_noise_is_said_beside_the_coefficients_that_it_spoils(
     if name == "stuck":
         x[2000:2300] = x[2000]
     file = table(folder / "odd.csv", k / 50, vx_v=x, temperature_c=np.round(warm, 3))
-    said = document(rig("noise", file, "--json"))
+    said = rig("noise", file, "--json").done().document
     found = next(each for each in said["disturbances"] if each["kind"] == kind)
     assert says in found["text"]
     assert spoils in found["spoils"]
@@ -131,7 +124,7 @@ def test_what_is_no_noise_is_said_beside_the_coefficients_that_it_spoils(
 
 
 def test_a_clean_record_has_no_disturbance(rig: Rig, folder: Path) -> None:
-    said = document(rig("noise", "still.npy", "--rate", "50", "--json"))
+    said = rig("noise", "still.npy", "--rate", "50", "--json").done().document
     assert (said["disturbances"], said["coefficients_without"]) == ([], None)
     assert "not noise" not in rig("noise", "still.npy", "--rate", "50").out
 
@@ -139,8 +132,8 @@ def test_a_clean_record_has_no_disturbance(rig: Rig, folder: Path) -> None:
 def test_a_table_with_its_rate_in_its_times(rig: Rig, folder: Path) -> None:
     file = table(folder / "still.csv", np.arange(6000) / 50, vx_v=samples(), vy_v=2 * samples())
     ended = rig("noise", file, "--channel", "vy", "--json")
-    assert document(ended)["coefficients"]["white-noise"]["value"] == pytest.approx(0.2 / np.sqrt(50), rel=0.05)
-    assert document(ended)["rate_hz"] == pytest.approx(50)
+    assert ended.done().document["coefficients"]["white-noise"]["value"] == pytest.approx(0.2 / np.sqrt(50), rel=0.05)
+    assert ended.done().document["rate_hz"] == pytest.approx(50)
     assert "still.csv: vy_v; --channel takes another: vx_v." in ended.err
     assert '"vq"' in rig("noise", file, "--channel", "vq").err
 
@@ -174,7 +167,7 @@ def test_a_run_straight_from_its_record(rig: Rig, run: str) -> None:
     assert "ug/sqrt(Hz)" in ended.out
     assert "15.07 Hz low-pass" in ended.err
     assert "supply_v was read in steps of 0.316 mV" in ended.err
-    white = document(rig("noise", run, "--json"))["coefficients"]["white-noise"]
+    white = rig("noise", run, "--json").done().document["coefficients"]["white-noise"]
     assert white["unit"] == "V/sqrt(Hz)"
     assert white["value"] == pytest.approx(1.1e-4, rel=0.15)  # 3.1 mV peak to peak is 4 rms behind 15.07 Hz (Ang V)
 
@@ -252,7 +245,7 @@ def test_short_gaps_are_closed_up_and_told(rig: Rig, folder: Path) -> None:
     t_s = np.arange(6000) / 50
     t_s[2000:] += 1.0
     ended = rig("noise", table(folder / "gap.csv", t_s, vx_v=samples()), "--json")
-    assert document(ended)["rate_hz"] == pytest.approx(50)
+    assert ended.done().document["rate_hz"] == pytest.approx(50)
     assert "a gap is closed up, 1 s in all" in ended.err
 
 
@@ -261,17 +254,17 @@ def test_times_of_a_computer_that_samples_reach_in_bursts(rig: Rig, folder: Path
     t_s = np.floor(np.arange(6000) / 5) * 0.1 + 0.001 * (np.arange(6000) % 5)
     file = table(folder / "bursts.csv", t_s, vx_v=samples())
     ended = rig("noise", file, "--json")
-    assert document(ended)["rate_hz"] == pytest.approx(50, rel=5e-3)
+    assert ended.done().document["rate_hz"] == pytest.approx(50, rel=5e-3)
     assert "Times are uneven" in ended.err
 
 
 def test_deviations_are_given_at_the_wanted_times(rig: Rig, folder: Path) -> None:
-    said = document(rig("noise", "still.npy", "--rate", "50", "--tau", "0.1", "--tau", "3", "--json"))["allan"]
+    said = rig("noise", "still.npy", "--rate", "50", "--tau", "0.1", "--tau", "3", "--json").done().document["allan"]
     assert said["tau_s"] == [0.1, 3.0]
     assert said["deviation"] == pytest.approx(deviations(samples(), (5, 150)).tolist())
     assert said["low"][1] < 0.1 / np.sqrt(150) < said["high"][1]
-    octaves = document(rig("noise", "still.npy", "--rate", "50", "--json"))["allan"]
-    again = document(rig("noise", "still.npy", "--rate", "50", "--tau", "0.16", "--json"))["allan"]
+    octaves = rig("noise", "still.npy", "--rate", "50", "--json").done().document["allan"]
+    again = rig("noise", "still.npy", "--rate", "50", "--tau", "0.16", "--json").done().document["allan"]
     for name in ("deviation", "low", "high"):
         assert again[name][0] == pytest.approx(octaves[name][3])
 
@@ -293,7 +286,7 @@ def test_noise_below_the_converters_step_and_of_two_levels_is_said_first(rig: Ri
     assert "flicker-noise       not known" in coarse.out
     assert "not noise:" not in coarse.out
     assert "cannot separate" not in coarse.err
-    said = document(rig("noise", "trap.npy", "--rate", "50", "--json"))
+    said = rig("noise", "trap.npy", "--rate", "50", "--json").done().document
     assert [each["kind"] for each in said["disturbances"]] == ["two-levels"]
     shown = rig("noise", "trap.npy", "--rate", "50").out
     assert "Random telegraph noise (burst noise, popcorn): x jumps between two levels 0.4" in shown

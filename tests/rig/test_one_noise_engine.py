@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -53,7 +52,7 @@ def answers(rig: Rig, *data: str) -> dict[str, dict[str, Any]]:
     """The documents of the three commands."""
     ended = {command: rig(command, *data, "--json") for command in ("noise", "diagnose", "discover")}
     assert {command: each.status for command, each in ended.items()} == dict.fromkeys(ended, 0), ended["noise"].err
-    return {command: json.loads(each.out) for command, each in ended.items()}
+    return {command: each.document for command, each in ended.items()}
 
 
 def named(document: Mapping[str, Any]) -> set[str]:
@@ -109,7 +108,7 @@ def test_of_the_default_rig_both_outputs_follow_the_supply_and_no_random_walk_is
     made = rig("run", "noise-floor", "--duration-s", "600", "--unattended", "--json")
     assert made.status == 0, made.err
     for axes, channel in ((["x", "y"], ()), (["y"], ("--channel", "vy"))):
-        found = answers(rig, json.loads(made.out)["run"], *channel)
+        found = answers(rig, made.document["run"], *channel)
         agree(found)
         followed = [(each["axis"], each["column"]) for each in found["noise"]["disturbances"]]
         assert followed == [(axis, "supply_v") for axis in axes]

@@ -129,7 +129,7 @@ def test_all_commands_and_the_page_agree_on_a_file(answers: Answers) -> None:
 @pytest.mark.parametrize("words", [("noise-floor", "--duration-s", "600"), ("sweep", "--step-deg", "45")])
 def test_all_answers_agree_on_runs_of_the_default_rig(rig: Rig, tmp_path: Path, words: tuple[str, ...]) -> None:
     made = rig("run", *words, "--unattended", "--json")
-    agree(Answers(json.loads(made.out)["run"], tmp_path))
+    agree(Answers(made.document["run"], tmp_path))
 
 
 def agree(answers: Answers) -> None:

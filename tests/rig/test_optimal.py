@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -142,11 +141,11 @@ def test_the_command_writes_poses_that_a_run_takes(rig: Callable[..., Any], tmp_
     out = tmp_path / "poses.csv"
     small = ("--step-deg", "30", "--inclinations-deg", "90,45,135")
     ended = rig("plan", "sweep", *small, "--optimal", "--poses", "20", "--out", str(out), "--json")
-    said = json.loads(ended.out)
+    said = ended.document
     assert said["schema"] == "rig.plan/1"
     assert said["poses"] == len(said["optimal"]["poses"]) == 20
     assert said["optimal"]["same_worst_error"]["duration_s"] == said["duration_s"]
-    planned = json.loads(rig("plan", "sweep", "--pose-list", str(out), "--dwell-s", "0.2", "--json").out)
+    planned = rig("plan", "sweep", "--pose-list", str(out), "--dwell-s", "0.2", "--json").document
     assert planned["settings"]["pose_list"] == out.read_text().splitlines()
 
 
@@ -178,9 +177,9 @@ def test_a_run_of_chosen_poses_checks_its_model(rig: Callable[..., Any], tmp_pat
         "--out",
         out,
     )
-    run = json.loads(rig("run", "sweep", "--pose-list", str(out), "--dwell-s", "0.5", "--unattended", "--json").out)
+    run = rig("run", "sweep", "--pose-list", str(out), "--dwell-s", "0.5", "--unattended", "--json").document
     out.unlink()  # the record has what it needs
-    fitted = json.loads(rig("fit", run["run"], "--json").out)
+    fitted = rig("fit", run["run"], "--json").document
     assert fitted["unseen"]["poses"] == 4
     assert fitted["unseen"]["repeats"] >= 4
     assert "check poses" in rig("fit", run["run"]).out

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections.abc import Callable
 from pathlib import Path
@@ -41,8 +40,8 @@ def write(path: Path, header: str, factor: float = 1.0, samples: int = 1) -> Non
 
 @pytest.mark.usefixtures("folder")
 def test_the_mapping_is_kept_with_the_run(rig: Rig) -> None:
-    run = json.loads(rig("import", "theirs.csv", *MAPPED, "--constant", "sensor=A7", "--json").out)["run"]
-    settings = json.loads(rig("show", run, "--json").out)["settings"]
+    run = rig("import", "theirs.csv", *MAPPED, "--constant", "sensor=A7", "--json").document["run"]
+    settings = rig("show", run, "--json").document["settings"]
     assert settings == {
         "file": "theirs.csv",
         "separator": "semicolon",
@@ -84,7 +83,7 @@ def test_raw_samples_become_poses_and_it_is_said(rig: Rig, folder: Path) -> None
     said = "raw.csv is a log of raw samples: the table has the means of 100 poses, from 6240 samples."
     ended = rig("compare", "raw.csv", "--json")
     assert (ended.status, ended.err.strip()) == (0, said)
-    assert json.loads(ended.out)["n"] == 100  # 104 but for four that are the same pose again, without a pause
+    assert ended.document["n"] == 100  # 104 but for four that are the same pose again, without a pause
     ended = rig("import", "raw.csv")
     assert said in ended.err
     assert "100 rows of poses" in ended.out
@@ -96,7 +95,7 @@ def test_a_single_inclination_is_reported_with_the_effects_it_cannot_test(rig: R
     for command in ("fit", "diagnose"):
         ended = rig(command, "one.csv", "--model", "linear", "--json")
         assert ended.status == 0
-        assert json.loads(ended.out)
+        assert ended.document
         assert (
             "z-axis-scale. The data has only one inclination, alpha = 90 deg; measure at other inclinations."
             in ended.err

@@ -15,7 +15,7 @@ import pytest
 from rig.record import Record
 from rig.record.measured import table_of
 from rig.record.recover import recover
-from rig.record.schema import MIGRATIONS, SCHEMA, metadata
+from rig.record.schema import NEW_COLUMNS, SCHEMA, metadata
 from tests.docs.markdown import ROOT
 
 FILES = sorted((ROOT / "tests" / "data" / "records").glob("schema-*.sql"))
@@ -42,7 +42,7 @@ def shape(path: Path) -> dict[str, set[tuple[str, str]]]:
 
 
 def test_there_is_a_way_from_every_version() -> None:
-    assert sorted(MIGRATIONS) == list(range(1, SCHEMA))
+    assert sorted(NEW_COLUMNS) == list(range(1, SCHEMA))
     assert [version(file) for file in FILES] == list(range(1, SCHEMA))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -40,7 +39,7 @@ def by_hand() -> dict[str, Any]:
 @pytest.mark.sockets
 def test_a_temperature_cycle_gives_coefficients_and_leaves_the_oven_off(rig: Rig) -> None:
     ended = rig("run", "temperature-cycle", "--temperatures-c", "40,55", "--soak-s", "3600", *FAST)
-    document = json.loads(ended.out)
+    document = ended.document
     found = document["results"]
     assert (ended.status, document["state"]) == (0, "complete")
     assert set(found) == {
@@ -78,14 +77,14 @@ def test_an_overheated_sensor_stops_the_run(rig: Rig, tmp_path: Path) -> None:
     path = tmp_path / "bench.yaml"
     path.write_text(yaml.safe_dump(bench({"limits": {"temperature_c": [-20, 45]}})))
     ended = rig("run", "temperature-cycle", "--temperatures-c", "40,60", "--bench", str(path), *FAST)
-    assert (ended.status, json.loads(ended.out)["state"]) == (4, "stopped")
+    assert (ended.status, ended.document["state"]) == (4, "stopped")
     assert "outside the limits of -20 to 45 C" in ended.err
 
 
 @pytest.mark.sockets
 def test_repetitions_of_every_kind_are_in_the_budget(rig: Rig) -> None:
     ended = rig("run", "repeat", "--times", "3", "--warm-s", "20", *FAST)
-    found = json.loads(ended.out)["results"]
+    found = ended.document["results"]
     assert ended.status == 0
     assert set(found) == {f"{q}-{k}-{a}" for q in ("bias", "scale") for k in ("as-is", "power", "mount") for a in "xy"}
     assert all(0 <= found[f"bias-{kind}-x"]["value"] < 0.01 for kind in ("as-is", "power", "mount"))
@@ -101,7 +100,7 @@ def test_what_the_technician_does_by_hand_is_in_the_budget(rig: Rig, tmp_path: P
     path = tmp_path / "bench.yaml"
     path.write_text(yaml.safe_dump(document))
     ended = rig("run", "repeat", "--times", "6", "--off-s", "30", "--warm-s", "5", "--bench", str(path), *FAST)
-    ended = json.loads(ended.out)
+    ended = ended.document
     found, moved_v = ended["results"], 0.020 / 8.2  # 20 pm of the 8.2 nm that 1 g displaces
     as_is = found.get("bias-as-is-x", {"value": 0.0})  # not determined where the converter shows no noise
     assert as_is["value"] < 1e-5
@@ -131,7 +130,7 @@ def test_the_reference_pose_tells_drift(rig: Rig, tmp_path: Path) -> None:
     path.write_text(yaml.safe_dump(document))
     arguments = ("--inclinations-deg", "90", "--step-deg", "45", "--reference-every", "4", "--bench", str(path))
     ended = rig("run", "sweep", *arguments, *FAST)
-    document = json.loads(ended.out)
+    document = ended.document
     drift = document["results"]["reference-drift-x"]
     assert set(document["results"]) <= set(names_with_limits())
     expected = 0.1 * (2.5 + 0.7) / 5

@@ -1,6 +1,5 @@
 """Results: their verdicts, which allow for the uncertainty, and their meanings in words."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -67,7 +66,7 @@ def test_the_noise_floor_is_that_of_the_world(rig: Rig, tmp_path: Path) -> None:
     world = {"preset": "ideal", "noise": {"white_v": 0.9e-3}}
     bench = bench_with(tmp_path, world=world, limits={"results": {"noise-pp-x": 0.004, "inclination-y": 0.01}})
     ended = rig("run", "noise-floor", "--duration-s", "20", "--bench", bench, "--unattended", "--json")
-    results = json.loads(ended.out)["results"]
+    results = ended.document["results"]
     assert ended.status == 1
     assert (results["noise-pp-x"]["verdict"], results["inclination-y"]["verdict"]) == ("pass", "fail")
     rms = results["noise-rms-x"]
@@ -84,7 +83,7 @@ def test_the_noise_floor_is_that_of_the_world(rig: Rig, tmp_path: Path) -> None:
 def test_a_still_record_is_a_table_of_samples_in_time(rig: Rig) -> None:
     ended = rig("run", "noise-floor", "--duration-s", "4", "--block-s", "1", "--unattended", "--json")
     with Record() as record:
-        table = table_of(record, json.loads(ended.out)["run"])
+        table = table_of(record, ended.document["run"])
     assert (table.kind, table.n) == ("still", 4000)
     assert np.allclose(np.diff(table.column("t_s")), 1e-3, atol=1e-9)
     assert "8 poses and blocks" in rig("runs").out
@@ -94,7 +93,7 @@ def test_a_still_record_is_a_table_of_samples_in_time(rig: Rig) -> None:
 def test_the_level_check_finds_the_tilt_and_not_the_offset(rig: Rig, tmp_path: Path) -> None:
     world = {"preset": "ideal", "base": {"tilt_x_deg": 0.2, "tilt_y_deg": 0.1}}
     ended = rig("run", "level-check", "--bench", bench_with(tmp_path, world=world), "--unattended", "--json")
-    results = json.loads(ended.out)["results"]
+    results = ended.document["results"]
     assert ended.status == 0
     found = sorted(abs(results[f"level-{axis}"]["value"]) for axis in "xy")
     assert found == pytest.approx([0.1, 0.2], abs=0.02)
@@ -108,7 +107,7 @@ def test_the_level_check_finds_the_tilt_and_not_the_offset(rig: Rig, tmp_path: P
 def test_a_table_that_is_not_level_refuses_to_start(rig: Rig, tmp_path: Path, procedure: str) -> None:
     bench = bench_with(tmp_path, world={"preset": "ideal", "base": {"tilt_x_deg": 0.5}})
     ended = rig("run", procedure, "--bench", bench, "--unattended", "--json")
-    document = json.loads(ended.out)
+    document = ended.document
     assert (ended.status, document["state"], document["poses"]) == (4, "stopped", 0)
     assert "level: the table is tilted by " in ended.err
     assert "limits.level_deg is 0.3; level the base" in ended.err
@@ -124,7 +123,7 @@ def test_a_bench_without_a_level_has_it_read_and_typed(rig: Rig, tmp_path: Path)
     shown = {"level-front-x": "0.05", "level-front-y": "0.11 deg", "level-back-x": "-0.03", "level-back-y": "-0,09"}
     (tmp_path / "answers.yaml").write_text(yaml.safe_dump(shown))
     files = ("--bench", str(tmp_path / "bench.yaml"), "--answers", str(tmp_path / "answers.yaml"))
-    results = json.loads(rig("run", "level-check", *files, "--unattended", "--json").out)["results"]
+    results = rig("run", "level-check", *files, "--unattended", "--json").document["results"]
     assert results["level-x"]["value"] == pytest.approx(0.04)
     assert results["level-y"]["value"] == pytest.approx(0.10)
     assert results["level-offset-y"]["value"] == pytest.approx(0.01)
@@ -138,7 +137,7 @@ def test_what_was_measured_is_complete_even_if_nothing_comes_of_it(rig: Rig, mon
 
     monkeypatch.setattr("rig.results.alignment.reversal", cannot)
     ended = rig("run", "level-check", "--unattended", "--json")
-    document = json.loads(ended.out)
+    document = ended.document
     assert (ended.status, document["state"], document["results"]) == (1, "complete", {})
     assert "results: none: the stretches are too short" in ended.err
     assert "results: none: the stretches are too short" in rig("show", document["run"]).out

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from typing import Any
 
@@ -28,7 +27,7 @@ UNATTENDED = ("--dwell-s", "0.2", "--unattended", "--json")
     ),
 )
 def test_it_goes_on_sample_for_sample(procedure: tuple[str, ...], at_pose: int, rig: Callable[..., Any]) -> None:
-    whole = json.loads(rig("run", *procedure, *UNATTENDED).out)["run"]
+    whole = rig("run", *procedure, *UNATTENDED).document["run"]
     with sigterm_at(at_pose):
         assert rig("run", *procedure, *UNATTENDED).status == 4
     with Record() as record:

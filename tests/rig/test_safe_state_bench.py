@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -61,8 +60,8 @@ def test_a_run_fails_is_repaired_and_goes_on(bench_file: Callable[..., Path], ri
     fault = {"what": "flipped-bit", "at_s": 40, "size": 20}
     broken = bench_file(with_faults("beta", fault))
     failed = rig("run", "sweep", *SMALL_ARGUMENTS, "--bench", str(broken), "--unattended", "--json")
-    run = json.loads(failed.out)["run"]
-    assert (failed.status, json.loads(failed.out)["state"]) == (3, "failed")
+    run = failed.document["run"]
+    assert (failed.status, failed.document["state"]) == (3, "failed")
     said = "rig: beta: reading register 0x007F (driver output status): received 11 bytes that are not an answer"
     assert failed.err.splitlines()[-1].startswith(said)
     assert rig("resume", run, "--unattended").status == 3  # nobody has repaired it

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -45,8 +44,7 @@ def swept(rig: Callable[..., Any], tmp_path: Path, bench: dict[str, Any]) -> tup
     ended = rig("run", "sweep", "--bench", str(file), *SWEEP, "--answers", str(answers))
     assert ended.status == 0, ended.err
     fitted = rig("fit", "last", "--model", "linear", "--json")
-    assert fitted.status == 0, fitted.err
-    document = json.loads(fitted.out)
+    document = fitted.done().document
     scale = {(p["name"], p.get("axis")): p["value"] for p in document["parameters"]}
     return tuple(value for (name, _), value in scale.items() if "scale" in name)
 

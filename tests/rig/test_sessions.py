@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -27,11 +26,11 @@ def test_six_faces_and_three_turns_give_the_published_calibration(rig: Rig, tmp_
     file = str(DATA / "imucal_ferraris_gyro" / "annotated_session.csv.gz")
     taken = rig("import", file, *SESSION, *RATE, *TURN, "--json")
     assert "the means of 9 rests and turns, from 9414 samples" in taken.err
-    run, models = json.loads(taken.out)["run"], [str(tmp_path / name) for name in ("leaning.yaml", "whole.yaml")]
-    assert json.loads(rig("diagnose", run, "--json").out)["candidates"][0]["effect"] == "gyro-misalignment"
+    run, models = taken.document["run"], [str(tmp_path / name) for name in ("leaning.yaml", "whole.yaml")]
+    assert rig("diagnose", run, "--json").document["candidates"][0]["effect"] == "gyro-misalignment"
     assert rig("add", "gyro-misalignment", "--model", "gyroscope", "--data", run, "--out", models[0]).status == 0
     rig("add", "gyro-g-sensitivity", "--model", models[0], "--data", run, "--out", models[1])
-    found = json.loads(rig("fit", run, "--model", models[1], "--json").out)
+    found = rig("fit", run, "--model", models[1], "--json").document
     values = {f"{p['effect']} {p['axis']}": p["value"] for p in found["parameters"]}
     assert [values[f"gyro-scale-factor {a}"] for a in "xyz"] == pytest.approx([16.6777, 16.1879, 16.2534], abs=2e-4)
     assert [values[f"gyro-bias {a}"] for a in "xyz"] == pytest.approx([1.96, -4.47, -3.65], abs=0.02)
@@ -39,7 +38,7 @@ def test_six_faces_and_three_turns_give_the_published_calibration(rig: Rig, tmp_
     assert "from its six faces: bias -6.018868, -48.28787, -28.96637" in rig("fit", run, "--model", models[0]).out
     page = tmp_path / "page.html"
     assert rig("report", run, "--model", models[0], "--out", str(page)).status == 0
-    assert "fails" in json.loads(rig("compare", run, "--model", models[0], "--json").out)
+    assert "fails" in rig("compare", run, "--model", models[0], "--json").document
 
 
 def test_what_a_session_does_not_say_is_asked_for(rig: Rig) -> None:
@@ -74,10 +73,10 @@ def test_a_section_is_a_turn_where_the_gyroscope_says_so(tmp_path: Path) -> None
 def test_a_device_that_writes_json_is_calibrated(rig: Rig, tmp_path: Path, device: str, left: float) -> None:
     names = [word for axis in "xyz" for word in ("--column", f"m{axis}=mag_{axis}:uT")]
     file, out = str(DATA / "sap6_mag_acc" / f"{device}.json"), str(tmp_path / "found.yaml")
-    taken = json.loads(rig("import", file, "--kind", "positions", *names, "--json").out)
+    taken = rig("import", file, "--kind", "positions", *names, "--json").document
     assert taken["rows"] == 24
-    assert json.loads(rig("discover", taken["run"], "--out", out, "--json").out)["causes"] == ["hard-iron", "soft-iron"]
-    found = json.loads(rig("fit", taken["run"], "--model", out, "--json").out)
+    assert rig("discover", taken["run"], "--out", out, "--json").document["causes"] == ["hard-iron", "soft-iron"]
+    found = rig("fit", taken["run"], "--model", out, "--json").document
     assert 1e3 * found["rmse"]["norm"] == pytest.approx(left, abs=0.006)
 
 

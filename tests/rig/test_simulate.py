@@ -94,7 +94,7 @@ def test_a_bench_of_which_a_part_is_real_runs_in_real_time(
         assert set(mixed.identities()) == set(instruments)
     settings = ("--step-deg", "180", "--inclinations-deg", "0", "--dwell-s", "0.01", "--settle-s", "0")
     asked = rig("run", "sweep", *settings, "--bench", str(path), "--json", "--unattended")
-    assert (asked.status, json.loads(asked.out)["state"]) == (4, "stopped")
+    assert (asked.status, asked.document["state"]) == (4, "stopped")
     assert 'the question "Is the sensor mounted face up' in asked.err
     path.with_name("answers.yaml").write_text("mounting: yes")
     answers = ("--answers", str(path.with_name("answers.yaml")))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import random
 from collections import Counter
 from collections.abc import Callable
@@ -51,7 +50,7 @@ def test_a_night_reaches_its_steady_state_after_hours_and_is_told_on_one_page(
     rig: Rig, cold: str, tmp_path: Path
 ) -> None:
     ended = rig("run", "soak", "--bench", cold, "--off-s", "36000", "--interval-s", "1800", *NIGHT)
-    document = json.loads(ended.out)
+    document = ended.document
     found = document["results"]
     assert set(found) <= set(names_with_limits())
     assert (ended.status, document["state"]) == (0, "complete"), ended.err
@@ -76,14 +75,14 @@ def test_a_night_reaches_its_steady_state_after_hours_and_is_told_on_one_page(
 @pytest.mark.slow
 def test_in_an_oven_it_is_steady_within_an_hour(rig: Rig, cold: str) -> None:
     ended = rig("run", "soak", "--bench", cold, "--oven-c", "45", "--off-s", "36000", "--duration-s", "21600", *NIGHT)
-    found = json.loads(ended.out)["results"]
+    found = ended.document["results"]
     assert 0.05 < found["steady-state-time"]["value"] < 1.0
 
 
 @pytest.mark.slow
 def test_a_soak_that_goes_on_is_foreseen_as_one_that_was_not_interrupted(rig: Rig, rig_home: Path) -> None:
     """The part that was being kept when the first half ended is all that a follower misses."""
-    run = json.loads(rig("run", *SHORT_RUN, "--block-s", "5", "--json").out)["run"]
+    run = rig("run", *SHORT_RUN, "--block-s", "5", "--json").document["run"]
     with Record(rig_home) as record:
         kept = list(record.kept(run))
     whole, resumed = SoakForecaster(), SoakForecaster()
@@ -120,7 +119,7 @@ def test_bounds_are_told_however_wide(steady_h: tuple[float, float, float], half
 @pytest.mark.slow
 def test_until_steady_it_ends_early_and_says_when(rig: Rig, cold: str) -> None:
     ended = rig("run", "soak", "--until-steady", "--bench", cold, "--off-s", "36000", *NIGHT)
-    document = json.loads(ended.out)
+    document = ended.document
     assert (ended.status, document["state"]) == (0, "complete"), ended.err
     assert document["poses"] < len(list(schedule(43200.0, 900.0, 450.0)))
     assert document["results"]["steady-state"]["value"] == 1.0
@@ -153,7 +152,7 @@ def test_a_soak_that_measures_its_first_pose_again_stays_on(rig: Rig, cold: str)
 @pytest.mark.slow
 def test_the_result_does_not_depend_on_the_blocks(rig: Rig) -> None:
     words = ("--duration-s", "96", "--interval-s", "32", "--json")
-    volts, runs = [], [json.loads(rig("run", *SHORT_RUN, *words, "--block-s", s).out)["run"] for s in ("2", "1")]
+    volts, runs = [], [rig("run", *SHORT_RUN, *words, "--block-s", s).document["run"] for s in ("2", "1")]
     with Record() as record:
         for run in runs:
             kept = [each for each in record.kept(run) if each.pose.path in ("hold 5", "reversal 6")]
@@ -198,12 +197,12 @@ def test_a_kill_in_a_hold_is_a_gap_in_the_results(rig_home: Path) -> None:
 
 
 def test_the_plan_of_a_night_is_quick_and_whole(rig: Rig) -> None:
-    document = json.loads(rig("plan", "soak", "--until-steady", "--json").out)
+    document = rig("plan", "soak", "--until-steady", "--json").document
     assert document["settings"]["until_steady"] is True
     assert document["poses"] == len(list(schedule(43200.0, 900.0, 10.0)))
     assert 13 * 3600 < document["duration_s"] < 15 * 3600  # an hour without power first
 
 
 def test_a_switch_may_have_a_value_too(rig: Rig) -> None:
-    assert json.loads(rig("plan", "soak", "--until-steady", "no", "--json").out)["settings"]["until_steady"] is False
+    assert rig("plan", "soak", "--until-steady", "no", "--json").document["settings"]["until_steady"] is False
     assert "true or false" in rig("plan", "soak", "--until-steady", "maybe").err

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import html
-import json
 import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -30,11 +28,6 @@ def words_of(command: str, data: str) -> tuple[str, ...]:
     if command == "add":
         return ("add", "flicker-noise", "--model", "still", "--data", data, "--out", "made.yaml")
     return (command, data, *(("--out", "page.html") if command == "report" else ()))
-
-
-def document(ended: Ended) -> dict[str, Any]:
-    assert ended.status == 0, ended.err
-    return dict(json.loads(ended.out))
 
 
 def write(path: str, t_s: Array, constants: str = "", **columns: Array) -> None:
@@ -61,7 +54,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, samples: tuple[Array
 
 
 def test_what_is_missing_is_found_added_and_no_longer_missed(rig: Rig, folder: Path) -> None:
-    said = document(rig("diagnose", "still.csv", "--json"))
+    said = rig("diagnose", "still.csv", "--json").done().document
     assert said["schema"] == "rig.diagnosis/1"
     assert (said["verdict"], said["candidates"][0]["effect"]) == ("effect-missing", "flicker-noise")
     best = said["candidates"][0]
@@ -69,7 +62,7 @@ def test_what_is_missing_is_found_added_and_no_longer_missed(rig: Rig, folder: P
     assert best["held_out_after"] < best["held_out_before"]
     assert best["axes"] == ["x", "y"]
 
-    added = document(rig(*words_of("add", "still.csv"), "--json"))
+    added = rig(*words_of("add", "still.csv"), "--json").done().document
     assert (added["schema"], added["verdict"], added["causes"]) == ("rig.discovery/1", "adequate", ["flicker-noise"])
     step = added["steps"][0]
     assert step["log_likelihood_after"] > step["log_likelihood_before"] + 100
@@ -77,7 +70,7 @@ def test_what_is_missing_is_found_added_and_no_longer_missed(rig: Rig, folder: P
     assert step["excess_after"] == pytest.approx(1, abs=0.15)
     assert step["excess_before"] > 2
 
-    again = document(rig("diagnose", "still.csv", "--model", "made.yaml", "--json", "--check"))
+    again = rig("diagnose", "still.csv", "--model", "made.yaml", "--json", "--check").done().document
     assert again["verdict"] == "adequate"
     kept = yaml.safe_load(Path("made.yaml").read_text())
     assert (kept["unit"], kept["provenance"]["sensor"]) == ("V", "ADXL203")
@@ -85,7 +78,7 @@ def test_what_is_missing_is_found_added_and_no_longer_missed(rig: Rig, folder: P
 
 
 def test_compare_sets_both_curves_side_by_side(rig: Rig, folder: Path) -> None:
-    said = document(rig("compare", "still.csv", "--json"))
+    said = rig("compare", "still.csv", "--json").done().document
     assert said["schema"] == "rig.comparison/1"
     for axis in "xy":
         assert said["excess"][axis] == pytest.approx(said["rmse"][axis] / said["noise_floor"][axis])
@@ -102,7 +95,7 @@ def test_compare_sets_both_curves_side_by_side(rig: Rig, folder: Path) -> None:
 
 
 def test_an_array_is_analysed_with_a_stated_rate(rig: Rig, folder: Path) -> None:
-    said = document(rig("fit", "x.npy", "--rate", "10", "--model", "still", "--json"))
+    said = rig("fit", "x.npy", "--rate", "10", "--model", "still", "--json").done().document
     assert said["parameters"][0]["unit"] == "count/sqrt(Hz)"
     ended = rig("discover", "x.npy", "--rate", "10", "--all")
     assert "+ flicker-noise" in ended.out
@@ -111,8 +104,8 @@ def test_an_array_is_analysed_with_a_stated_rate(rig: Rig, folder: Path) -> None
 
 
 def test_one_channel_may_be_asked_for(rig: Rig, folder: Path) -> None:
-    assert document(rig("diagnose", "still.csv", "--channel", "vy", "--json"))["verdict"] == "adequate"
-    only = document(rig("fit", "still.csv", "--channel", "vy", "--out", "y.yaml", "--json"))
+    assert rig("diagnose", "still.csv", "--channel", "vy", "--json").done().document["verdict"] == "adequate"
+    only = rig("fit", "still.csv", "--channel", "vy", "--out", "y.yaml", "--json").done().document
     assert {p["axis"] for p in only["parameters"]} == {"y"}
     ended = rig("compare", "still.csv", "--model", "y.yaml")
     assert (ended.status, "has values for the axes y, and none for x" in ended.err) == (2, True)
@@ -131,10 +124,10 @@ def test_the_report_is_one_page_with_both_pictures(rig: Rig, folder: Path) -> No
 
 def test_a_run_straight_from_its_record(rig: Rig, rig_home: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     shutil.copytree(recorded.record(tmp_path_factory, "noise-floor"), rig_home)
-    run = document(rig("runs", "--json"))["runs"][0]["run"]
-    said = document(rig("diagnose", run, "--json"))
+    run = rig("runs", "--json").done().document["runs"][0]["run"]
+    said = rig("diagnose", run, "--json").done().document
     assert (said["data"], said["verdict"]) == (run, "adequate")
-    fit = document(rig("fit", run, "--json"))
+    fit = rig("fit", run, "--json").done().document
     density = {p["axis"]: p["value"] for p in fit["parameters"]}
     assert density == pytest.approx(dict.fromkeys("xy", 1.126e-4), rel=0.1)  # 0.775 mV behind 15.07 Hz (Ang V)
 
@@ -146,8 +139,12 @@ def test_flicker_and_hum_of_the_simulated_world_are_found_through_its_sockets(
     monkeypatch.setenv("RIG_HOME", str(folder / "home"))
     noise = {"x": {"flicker_v": 100e-6}, "y": {"hum_v": 200e-6}}
     bench = str(bench_file({"world": {"preset": "ideal", "noise": noise}}))
-    run = document(rig("run", "noise-floor", "--duration-s", "300", "--bench", bench, "--unattended", "--json"))["run"]
-    said = document(rig("discover", run, "--out", "found.yaml", "--json"))
+    run = (
+        rig("run", "noise-floor", "--duration-s", "300", "--bench", bench, "--unattended", "--json")
+        .done()
+        .document["run"]
+    )
+    said = rig("discover", run, "--out", "found.yaml", "--json").done().document
     assert set(said["causes"]) == {"flicker-noise", "sinusoidal-noise"}
     entries = yaml.safe_load(Path("found.yaml").read_text())["effects"]
     known = {(e["effect"], p["name"], p["axis"]): p for e in entries for p in e["parameters"]}
@@ -161,7 +158,7 @@ def test_flicker_and_hum_of_the_simulated_world_are_found_through_its_sockets(
 def test_an_ambiguous_answer_comes_with_a_longer_record(rig: Rig, folder: Path) -> None:
     random = np.random.default_rng(0)
     np.save("short.npy", white(random, N) + 0.003 * np.cumsum(random.standard_normal(N)))
-    said = document(rig("diagnose", "short.npy", "--rate", "10", "--json"))
+    said = rig("diagnose", "short.npy", "--rate", "10", "--json").done().document
     assert said["verdict"] == "ambiguous"
     assert said["candidates"][0]["indistinguishable_from"]
     following = said["next_experiment"]
@@ -227,8 +224,8 @@ def test_known_noise_lets_a_quiet_model_be_adequate(rig: Rig, folder: Path) -> N
     still = [2.5 + 1e-3 * white(random, N) + 2.5e-4 * fractional(random, N) for _ in range(2)]
     write("rest.csv", np.arange(N) / RATE_HZ, vx_v=still[0], vy_v=still[1])
     assert rig("discover", "rest.csv", "--out", "noise.yaml").status == 0
-    assert document(rig("diagnose", "sweep.csv", "--json"))["verdict"] == "unexplained"
-    assert document(rig("diagnose", "sweep.csv", "--noise", "noise.yaml", "--json"))["verdict"] == "adequate"
+    assert rig("diagnose", "sweep.csv", "--json").done().document["verdict"] == "unexplained"
+    assert rig("diagnose", "sweep.csv", "--noise", "noise.yaml", "--json").done().document["verdict"] == "adequate"
     assert rig("compare", "sweep.csv", "--noise", "noise.yaml", "--check").status == 0
 
 
@@ -262,9 +259,9 @@ def test_a_ramp_at_rest_is_calibrated_in_less_than_ten_lines(rig: Rig, folder: P
     assert len(ended.out.splitlines()) < 10
     assert "temperature-hysteresis" in ended.out
     assert "+ temperature-hysteresis" in rig("discover", "ramp.csv", "--all").out
-    said = document(rig("compare", "ramp.csv", "--model", "ramp.yaml", "--json"))
+    said = rig("compare", "ramp.csv", "--model", "ramp.yaml", "--json").done().document
     assert said["fails"] == []
-    again = document(rig("discover", "ramp.csv", "--model", "ramp.yaml", "--json"))
+    again = rig("discover", "ramp.csv", "--model", "ramp.yaml", "--json").done().document
     assert (again["verdict"], again["causes"]) == ("adequate", [])
     assert rig("report", "ramp.csv", "--model", "ramp.yaml", "--out", "ramp.html").status == 0
 
@@ -277,8 +274,8 @@ def test_each_sensor_of_a_still_record_has_its_own_unit(
     random, names = np.random.default_rng(6), ["ax (m/s2)", "ay (m/s2)", "az (m/s2)"]
     names += ["gx (rad/s)", "gy (rad/s)", "gz (rad/s)", "mx", "my", "mz"]
     write("six.csv", np.arange(N) / RATE_HZ, **{name: white(random, N) for name in names})
-    taken = document(rig("import", "six.csv", "--kind", "still", "--json"))
+    taken = rig("import", "six.csv", "--kind", "still", "--json").done().document
     for channel, unit, noise in (("ax", "m/s2", 1.0), ("gy", "deg/s", 180 / np.pi), ("mz", "count", 1.0)):
-        found = document(rig("noise", taken["run"], "--channel", channel, "--json"))
+        found = rig("noise", taken["run"], "--channel", channel, "--json").done().document
         assert found["unit"] == unit
         assert found["allan"]["deviation"][0] == pytest.approx(noise, rel=0.1)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from typing import Any
 
@@ -89,7 +88,7 @@ def test_a_long_plan_is_summed_up_and_a_short_one_printed(rig: Rig) -> None:
     assert "  24:21  alpha 60, beta 0 to 360 deg: 37 poses\n" in summed
     assert len(summed.splitlines()) < 25
     assert "--moves" in summed
-    document = json.loads(rig("plan", "sweep", "--json").out)
+    document = rig("plan", "sweep", "--json").document
     assert all(f"  {step['what']}\n" in whole for step in document["steps"])
     assert [stretch["poses"] for stretch in document["stretches"]] == [37] * 14
     assert "beta from 0 to 180 deg\n" in rig("plan", "level-check").out

@@ -140,13 +140,13 @@ def test_every_command_takes_runs_of_gyroscopes_and_magnetometers(
 ) -> None:
     field, rates = run(rig, folder, FIELD)["run"], run(rig, folder, (*RATES, *ONE))["run"]
     model, page = str(tmp_path / "hard.yaml"), tmp_path / "page.html"
-    assert json.loads(rig("diagnose", field, "--json").out)["candidates"][0]["effect"] == "hard-iron"
+    assert rig("diagnose", field, "--json").document["candidates"][0]["effect"] == "hard-iron"
     assert rig("add", "hard-iron", "--model", "field", "--data", field, "--out", model).status == 0
-    assert json.loads(rig("diagnose", field, "--model", model, "--json").out)["candidates"][0]["effect"] == "soft-iron"
-    assert "fails" in json.loads(rig("compare", field, "--model", model, "--json").out)
+    assert rig("diagnose", field, "--model", model, "--json").document["candidates"][0]["effect"] == "soft-iron"
+    assert "fails" in rig("compare", field, "--model", model, "--json").document
     assert rig("report", field, "--model", "magnetometer", "--out", str(page)).status == 0
     assert "<h2>General calibration</h2>" in page.read_text(encoding="utf-8")
-    assert json.loads(rig("diagnose", rates, "--json").out)["verdict"] == "effect-missing"
+    assert rig("diagnose", rates, "--json").document["verdict"] == "effect-missing"
 
 
 @pytest.mark.sockets
@@ -167,7 +167,7 @@ def test_a_run_stopped_in_a_turn_halts_the_stage_and_resumes_with_the_same_sampl
         patched.setattr(RotaryStage, "_require_turning", interrupted)
         stopped = rig("run", *RATES, *ONE, "--bench", str(folder / "quick.yaml"))
     assert stopped.status == 4
-    name = json.loads(stopped.out)["run"]
+    name = stopped.document["run"]
     with Record() as record:
         assert (record.run(name).state, record.run(name).rows) == ("stopped", 3)
         assert not any(event.what == "not stopped" for event in record.events(name))

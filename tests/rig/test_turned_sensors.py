@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -34,13 +33,13 @@ def gyroscope(tmp_path: Path) -> str:
 
 def test_a_magnetometer_begins_with_the_field_alone(rig: Rig, magnetometer: str, tmp_path: Path) -> None:
     said = rig("discover", magnetometer, "--out", str(tmp_path / "found.yaml"), "--json")
-    found = json.loads(said.out)
+    found = said.document
     assert found["causes"] == ["hard-iron", "soft-iron"]
     hard, soft = found["steps"]
     assert hard["excess_before"] > 5 * hard["excess_after"]
     assert soft["excess_before"] > 20 * soft["excess_after"]
     assert "the residual of an ellipsoid counts as noise" in said.err
-    again = json.loads(rig("fit", magnetometer, "--model", str(tmp_path / "found.yaml"), "--json").out)
+    again = rig("fit", magnetometer, "--model", str(tmp_path / "found.yaml"), "--json").document
     assert 1e3 * again["rmse"]["norm"] == pytest.approx(0.76, abs=0.01)
     assert np.shape(again["calibration"]["M"]["value"]) == (3, 3)
 
@@ -72,11 +71,11 @@ def test_a_fit_of_a_single_turn_lists_the_effects_that_it_cannot_show(rig: Rig, 
 def test_every_command_takes_a_gyroscope(rig: Rig, gyroscope: str, tmp_path: Path) -> None:
     model = str(tmp_path / "found.yaml")
     said = rig("discover", gyroscope, "--out", model, "--json")
-    assert json.loads(said.out)["causes"] == ["gyro-misalignment"]
+    assert said.document["causes"] == ["gyro-misalignment"]
     assert "give the constant latitude_deg" in said.err
     assert "rate " in rig("compare", gyroscope).out
     assert 'The model "gyroscope" misses gyro-misalignment.' in rig("diagnose", gyroscope).out
-    fitted = json.loads(rig("fit", gyroscope, "--model", model, "--json").out)["calibration"]
+    fitted = rig("fit", gyroscope, "--model", model, "--json").document["calibration"]
     assert fitted["unit"] == {"from": "count", "to": "deg/s"}
     assert np.diag(fitted["S"]["value"]) == pytest.approx([1 / 16.0, 1 / 15.5, 1 / 16.4], rel=1e-3)
     page = tmp_path / "report.html"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -30,7 +29,7 @@ def dead(tmp_path: Path) -> str:
 def test_exit_status_and_verdict_without_check(rig: Callable[..., Any], dead: str, command: str) -> None:
     ended = rig(command, dead, "--json")
     assert ended.status == 1, ended.err
-    document = json.loads(ended.out)
+    document = ended.document
     assert document["verdict"] == "no-response"
     assert REASON in document["residual_structure"]
     assert REASON in rig(command, dead).out

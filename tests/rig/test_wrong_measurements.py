@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from itertools import product
 from pathlib import Path
@@ -106,4 +105,4 @@ def test_every_command_names_a_wrong_input(rig: Callable[..., Any], tmp_path: Pa
     wrong = WRONG["poses"][name](GOOD["poses"]())
     (tmp_path / "wrong.csv").write_text(wrong.text())
     ended = rig(command, str(tmp_path / "wrong.csv"), "--model", "linear", "--json")
-    assert SAID[name] in ended.err + str(json.loads(ended.out)["residual_structure"])
+    assert SAID[name] in ended.err + str(ended.document["residual_structure"])

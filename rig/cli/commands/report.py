@@ -103,7 +103,7 @@ def certificate_command(
     from calibrations.presentation.certificate.content import document
     from calibrations.presentation.certificate.results import require_reference
     from rig.bench import read_bench
-    from rig.services.certify import CertificateInput, certified, failed_results
+    from rig.services.certify import CertificateInput, certified, failed_results, format_certificate
     from rig.services.load import is_still, loaded_table
 
     paths = _paths(out)
@@ -118,7 +118,7 @@ def certificate_command(
         certificate = certified(request, number, customer)
         for path in paths:
             progress.text = f"writing {path}"
-            _write_certificate(path, certificate)
+            write_whole(path, format_certificate(certificate, path.suffix))
     if as_json:
         emit(document(certificate) | {"files": [str(path) for path in paths]})
     else:
@@ -131,13 +131,6 @@ def _paths(out: Path) -> list[Path]:
     if out.suffix and out.suffix not in FORMS and not out.suffix[1:].isdigit():
         raise OutputError(f'{out}: a certificate ends in .html, .pdf or .xml, not in "{out.suffix}"')
     return [out] if out.suffix in FORMS else [out.with_name(out.name + form) for form in FORMS]
-
-
-def _write_certificate(path: Path, certificate: Certificate) -> None:
-    """Write one format of the certificate."""
-    from rig.services.certify import format_certificate
-
-    write_whole(path, format_certificate(certificate, path.suffix))
 
 
 def _certificate_lines(certificate: Certificate) -> list[str]:
