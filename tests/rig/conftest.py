@@ -56,8 +56,11 @@ class Ended:
         return self
 
 
+Rig = Callable[..., Ended]  # calls a command
+
+
 @pytest.fixture
-def rig(capsys: pytest.CaptureFixture[str]) -> Callable[..., Ended]:
+def rig(capsys: pytest.CaptureFixture[str]) -> Rig:
     """Call a command."""
 
     def call(*arguments: str) -> Ended:
@@ -107,7 +110,7 @@ def work(tmp_path: Path, text: str, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def refused(rig: Callable[..., Ended], work: Path) -> Callable[..., str]:
+def refused(rig: Rig, work: Path) -> Callable[..., str]:
     """Call a command that must fail, and nothing else; its message."""
 
     def call(*arguments: str, status: int = 2) -> str:

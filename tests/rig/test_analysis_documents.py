@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,8 @@ from calibrations.importing.foreign import write_csv
 from calibrations.table import Table
 from rig.record import Record
 from tests.calibrations.synthetic import components, poses, turns
+from tests.rig.conftest import Rig
 
-Rig = Callable[..., Any]
 NUMBER, BOTH = (int, float), {"x": float, "y": float}
 CANDIDATE = {
     "effect": str,

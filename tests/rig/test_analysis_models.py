@@ -15,8 +15,8 @@ from calibrations.importing.foreign import read_csv, write_csv
 from calibrations.model.file import read_model
 from calibrations.table import Table
 from tests.calibrations.synthetic import components, poses, turns
+from tests.rig.conftest import Rig
 
-Rig = Callable[..., Any]
 OWN = '''from calibrations.effects import Effect, Parameter
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +15,11 @@ from rig.bench import DEFAULT
 from rig.record import Record
 from rig.record.measured import table_of
 from rig.record.tables import correct_angles
+from tests.rig.conftest import Rig
 
 WOBBLE_DEG, PHASE_DEG = 0.07, 30.0
 STAGES = {"beta": {"wobble_deg": WOBBLE_DEG, "wobble_phase_deg": PHASE_DEG}}
 WORLD = {"preset": "ideal", "spread": {"imperfection_fraction": 0.0}, "stages": STAGES}
-Rig = Callable[..., Any]
 
 
 def autocollimator(folder: Path) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import gzip
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+
+from tests.rig.conftest import Rig
 
 
 @pytest.mark.parametrize(
@@ -78,9 +79,7 @@ def test_what_is_no_table_is_not_quoted(refused: Callable[..., str], work: Path,
         assert not any(word in told for word in ("root:x", "daemon", "s3cret"))
 
 
-def test_a_damaged_line_of_a_log_is_skipped_or_refused(
-    refused: Callable[..., str], rig: Callable[..., Any], work: Path
-) -> None:
+def test_a_damaged_line_of_a_log_is_skipped_or_refused(refused: Callable[..., str], rig: Rig, work: Path) -> None:
     rows = [f"{k / 100:.2f},{0.01 * (k % 7)}" for k in range(500)]
     (work / "still.csv").write_text("\n".join(["t_s,vx_v", *rows[:300], "3.0,,0.1", *rows[300:]]) + "\n")
     arguments = ("import", "still.csv", "--kind", "still")

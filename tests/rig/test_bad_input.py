@@ -12,10 +12,8 @@ import yaml
 
 from rig.bench import DEFAULT
 from rig.record import Record
-from tests.rig.conftest import MODEL
+from tests.rig.conftest import MODEL, Rig
 from tests.rig.test_analysis_models import OWN
-
-Rig = Callable[..., Any]
 
 
 def test_data_that_is_neither_file_nor_run(refused: Callable[..., str], rig: Rig) -> None:

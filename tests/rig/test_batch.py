@@ -1,6 +1,5 @@
 """A batch: up to four sensors, eight axes, in one run; each gets its own calibration."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +10,8 @@ import yaml
 from rig.bench import DEFAULT
 from rig.record import Record
 from rig.record.measured import table_of
-from tests.rig.conftest import Ended
+from tests.rig.conftest import Rig
 
-Call = Callable[..., Ended]
 NAMES = ("a1", "a2", "a3", "a4")
 TURNED_DEG = {"a1": 0.0, "a2": 2.0, "a3": -3.0, "a4": 1.0}
 SWEEP = ("--inclinations-deg", "90,30,150", "--step-deg", "30", "--dwell-s", "1", "--unattended", "--json")
@@ -65,7 +63,7 @@ def run(swept: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_each_sensor_gets_its_own_calibration(rig: Call, run: str, tmp_path: Path, name: str) -> None:
+def test_each_sensor_gets_its_own_calibration(rig: Rig, run: str, tmp_path: Path, name: str) -> None:
     ended = rig("fit", f"{run}/{name}", "--model", "physical", "--out", str(tmp_path / "model.yaml"), "--json")
     found = {(p["effect"], p["name"]): p for p in ended.done().document["parameters"]}
     turned = found["axis-misalignment", "z"]
@@ -82,19 +80,19 @@ def test_each_sensor_of_a_batch_has_a_table_with_its_serial_number(run: str) -> 
         np.testing.assert_array_equal(table.column("temperature_c"), tables[0].column("temperature_c"))
 
 
-def test_a_run_of_a_batch_needs_the_sensors_name(rig: Call, run: str) -> None:
+def test_a_run_of_a_batch_needs_the_sensors_name(rig: Rig, run: str) -> None:
     ended = rig("compare", run)
     assert ended.status == 2
     assert f"has the sensors a1, a2, a3, a4; choose one, such as {run}/a1" in ended.err
 
 
-def test_a_sensor_that_is_not_there_is_named_with_the_nearest(rig: Call, run: str) -> None:
+def test_a_sensor_that_is_not_there_is_named_with_the_nearest(rig: Rig, run: str) -> None:
     ended = rig("compare", f"{run}/a11")
     assert ended.status == 2
     assert "has no sensor 'a11'. Did you mean 'a1'?" in ended.err
 
 
-def test_results_carry_the_sensors_name(rig: Call, swept: tuple[Path, Path], tmp_path: Path) -> None:
+def test_results_carry_the_sensors_name(rig: Rig, swept: tuple[Path, Path], tmp_path: Path) -> None:
     found = document()
     found["limits"]["results"] = {"noise-pp-x": 0.004}
     bench = tmp_path / "limited.yaml"
@@ -106,7 +104,7 @@ def test_results_carry_the_sensors_name(rig: Call, swept: tuple[Path, Path], tmp
 
 
 @pytest.mark.slow
-def test_a_search_goes_by_the_first_and_finds_all(rig: Call, swept: tuple[Path, Path]) -> None:
+def test_a_search_goes_by_the_first_and_finds_all(rig: Rig, swept: tuple[Path, Path]) -> None:
     ended = rig("run", "misalignment", "--dwell-s", "1", "--bench", str(swept[1]), "--unattended", "--json")
     results = ended.done().document["results"]
     for name in NAMES:
@@ -123,9 +121,7 @@ def test_a_search_goes_by_the_first_and_finds_all(rig: Call, swept: tuple[Path, 
         ({"sensors": {**{n: {} for n in NAMES}, "a/5": {}}}, "key sensors.a/5"),
     ],
 )
-def test_sensors_and_channels_must_fit_together(
-    rig: Call, tmp_path: Path, change: dict[str, Any], message: str
-) -> None:
+def test_sensors_and_channels_must_fit_together(rig: Rig, tmp_path: Path, change: dict[str, Any], message: str) -> None:
     bench = tmp_path / "bad.yaml"
     bench.write_text(yaml.safe_dump(document() | change))
     ended = rig("plan", "sweep", "--bench", str(bench))

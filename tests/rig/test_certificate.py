@@ -14,8 +14,8 @@ from calibrations.model.file import dump_model
 from rig.bench import Bench
 from rig.record import Record
 from tests.calibrations.certified import before
+from tests.rig.conftest import Rig
 
-Rig = Callable[..., Any]
 BENCH = {
     "sensor": {"name": "ADXL203", "serial": "17", "manufacturer": "Analog Devices", "filter_corner_hz": 15.07},
     "laboratory": {"name": "The Lab", "person": "A. Person", "city": "Town", "country": "DE", "customer": "Somebody"},

@@ -12,8 +12,8 @@ import yaml
 
 from rig.bench import DEFAULT, Bench
 from rig.bench.certificates import certificates, find_expired
+from tests.rig.conftest import Rig
 
-Rig = Callable[..., Any]
 OLD, GOOD = {"number": "CAL-17", "due": "2001-03-01"}, {"number": 42, "due": "2999-12-31"}
 MARK = "beta's certificate CAL-17 expired on 2001-03-01"
 SWEEP = ("run", "sweep", "--inclinations-deg", "90", "--step-deg", "45", "--dwell-s", "0.2", "--unattended")

@@ -7,7 +7,6 @@ import sqlite3
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -16,6 +15,7 @@ from rig.errors import RecordError
 from rig.record import KeptPose, Record
 from rig.record.measured import table_of
 from rig.record.recover import is_sound, recover
+from tests.rig.conftest import Rig
 from tests.rig.test_doctor import PAGE, recorded
 from tests.rig.test_store import begin, block
 
@@ -87,7 +87,7 @@ def damage_page(folder: Path, bad: str, good: str) -> None:
     raise AssertionError("no page belongs to one run alone")
 
 
-def test_a_damaged_page_hides_no_other_run(rig: Callable[..., Any], rig_home: Path) -> None:
+def test_a_damaged_page_hides_no_other_run(rig: Rig, rig_home: Path) -> None:
     bad, good = two_runs(rig_home)
     repeat_poses(rig_home, 200)
     damage_page(rig_home, bad, good)
@@ -97,7 +97,7 @@ def test_a_damaged_page_hides_no_other_run(rig: Callable[..., Any], rig_home: Pa
     assert rig("show", good).status == 0
 
 
-def test_one_damaged_run_is_named_and_hides_no_other(rig: Callable[..., Any], rig_home: Path, tmp_path: Path) -> None:
+def test_one_damaged_run_is_named_and_hides_no_other(rig: Rig, rig_home: Path, tmp_path: Path) -> None:
     bad, good = two_runs(rig_home)
     flip(rig_home, "constants", bad)
     listed = rig("runs")

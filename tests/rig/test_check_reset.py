@@ -10,14 +10,14 @@ from typing import Any
 
 import pytest
 
+from tests.rig.conftest import Rig
+
 CONVERTER = {"driver": "labjack_t7", "url": "simulated", "settings": {"channels": {"vx": 0}}}
 TIME_OUT, OVERCURRENT = 0x85, 0x20  # the second needs a power cycle
 
 
 @pytest.fixture
-def check(
-    rig: Callable[..., Any], bench_file: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
-) -> Callable[..., Any]:
+def check(rig: Rig, bench_file: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     """Call `rig check` on a bench of one stage with this alarm and these settings; `answer` is what a person types."""
 
     def call(*options: str, alarm: int | None = None, answer: str = "", **settings: object) -> Any:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable
-from typing import Any
 
 import click
 import pytest
@@ -18,6 +17,7 @@ from rig.cli import rig as group
 from rig.cli.terminal.failure import BROKEN_PIPE, PROGRAM_FAULT, exit_status, status_of
 from rig.errors import BenchError, InstrumentFailed, Stopped
 from rig.record import Record
+from tests.rig.conftest import Rig
 
 COMMANDS = Commands().list_commands(click.Context(group))
 
@@ -57,7 +57,7 @@ def test_a_list_loads_no_compiler_and_no_analysis(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_every_command_explains_itself(name: str, rig: Callable[..., Any]) -> None:
+def test_every_command_explains_itself(name: str, rig: Rig) -> None:
     ended = rig(name, "--help")
     assert ended.status == 0
     assert f"Usage: rig {name}" in ended.out
@@ -168,9 +168,7 @@ def test_a_shell_gets_its_completion_script(
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_a_command_prints_the_completion_script(
-    shell: str, rig: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_command_prints_the_completion_script(shell: str, rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("click.shell_completion.BashComplete._check_version", lambda *_: None)
     assert f"_RIG_COMPLETE={shell}_complete" in rig("completion", shell).out
 

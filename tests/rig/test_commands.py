@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -13,9 +12,9 @@ import yaml
 from calibrations.importing.foreign import read_csv
 from rig.bench import DEFAULT, read_bench
 from rig.files import home
+from tests.rig.conftest import Rig
 from tests.rig.rigging import POSES, SMALL_ARGUMENTS
 
-Rig = Callable[..., Any]
 RUN = ("run", "sweep", "--unattended", *SMALL_ARGUMENTS)
 
 

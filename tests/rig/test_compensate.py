@@ -5,16 +5,13 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from calibrations.model.file import dump_model
 from tests.calibrations.fitted import PHYSICAL, model
-
-Rig = Callable[..., Any]
+from tests.rig.conftest import Rig
 
 
 @pytest.fixture

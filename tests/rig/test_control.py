@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +10,8 @@ import pytest
 
 from rig.bench.result_names import names_with_limits
 from rig.record import Record
+from tests.rig.conftest import Rig
 
-Rig = Callable[..., Any]
 QUIET = [2.50001, 2.49999] * 5
 ONE = {"sensor": {"name": "ADXL203", "serial": "CS-1"}}
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ from procedures.sweep import grid
 from rig.bench import read_bench
 from rig.bench.file import DEMO
 from rig.services.hidden_faults import MATERIAL, MECHANISMS, Curve, Faults, Group, group_steps, hidden_faults
+from tests.rig.conftest import Rig
 
 SAME = {
     "unequal or uneven plates": "quadratic-nonlinearity",
@@ -111,7 +111,7 @@ def _exists(path: str) -> bool:
 
 
 @pytest.mark.slow
-def test_the_demonstration_finds_what_was_hidden(rig: Callable[..., Any], tmp_path: Path) -> None:
+def test_the_demonstration_finds_what_was_hidden(rig: Rig, tmp_path: Path) -> None:
     document = rig("demo", "--folder", str(tmp_path / "demo"), "--json").document
     assert {row["fault"]: row["effect"] for row in document["hidden_faults"]} == SAME
     assert all(abs(row["found"] - row["size"]) < 4 * row["std"] for row in document["hidden_faults"])
@@ -122,7 +122,7 @@ def test_the_demonstration_finds_what_was_hidden(rig: Callable[..., Any], tmp_pa
 
 
 @pytest.mark.slow
-def test_the_realistic_demonstration_tells_what_it_did_not_find(rig: Callable[..., Any], tmp_path: Path) -> None:
+def test_the_realistic_demonstration_tells_what_it_did_not_find(rig: Rig, tmp_path: Path) -> None:
     document = rig("demo", "--realistic", "--folder", str(tmp_path / "demo"), "--json").document
     rows = document["hidden_faults"]
     large = [row for row in rows if row["size_over_floor"] >= MATERIAL]

@@ -17,8 +17,8 @@ from rig.bench.file import DEFAULT
 from rig.record import Record
 from rig.record.measured import table_of
 from tests.recorded import command
+from tests.rig.conftest import Rig
 
-Rig = Callable[..., Any]
 OUTPUTS = "time ax ay az gx gy gz mx my mz supply d63 temperature"
 COLUMNS = {name: k for k, name in enumerate(OUTPUTS.split(), 1)}
 PER_G = {"g": 1.0, "m/s^2": 9.80665, "count": 16384.0}

@@ -7,7 +7,6 @@ import os
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +17,14 @@ from rig.errors import RecordError
 from rig.record import KeptPose, Record
 from rig.record.recover import recover
 from rig.services.health import without_secrets
+from tests.rig.conftest import Rig
 from tests.rig.test_store import begin, block
 
 PAGE = 4096
 ROOT = Path(__file__).parents[2]
 
 
-def test_it_collects_versions_checks_runs_and_the_last_runs_log(rig: Callable[..., Any], tmp_path: Path) -> None:
+def test_it_collects_versions_checks_runs_and_the_last_runs_log(rig: Rig, tmp_path: Path) -> None:
     with Record() as record:
         run = begin(record)
         record.log(run, 1.5, "run", "doing", "measuring")
@@ -43,7 +43,7 @@ def test_it_collects_versions_checks_runs_and_the_last_runs_log(rig: Callable[..
     assert b"samples" not in archive.read_bytes()
 
 
-def test_without_any_run_all_checks_pass(rig: Callable[..., Any], tmp_path: Path) -> None:
+def test_without_any_run_all_checks_pass(rig: Rig, tmp_path: Path) -> None:
     ended = rig("doctor", "--out", str(tmp_path / "doctor.zip"))
     assert (ended.status, "there is no run yet" in ended.out) == (0, True)
     ended = rig("doctor", "--out", str(tmp_path / "again.zip"), "--json")
@@ -69,7 +69,7 @@ def test_a_package_that_cannot_be_imported_is_named_in_an_archive(tmp_path: Path
         assert "error" in json.loads(file.read("bench.json"))
 
 
-def test_a_bench_goes_with_it_and_no_secret(rig: Callable[..., Any], tmp_path: Path, bench_file: Any) -> None:
+def test_a_bench_goes_with_it_and_no_secret(rig: Rig, tmp_path: Path, bench_file: Any) -> None:
     archive = tmp_path / "doctor.zip"
     assert rig("doctor", "--bench", str(bench_file({})), "--out", str(archive)).status == 0
     with zipfile.ZipFile(archive) as file:
@@ -103,7 +103,7 @@ def test_a_sound_record_is_copied_whole(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("page", [30, 45, 70])
 def test_of_a_damaged_record_is_read_what_can_be_and_what_is_lost_is_said(
-    rig: Callable[..., Any], rig_home: Path, tmp_path: Path, page: int
+    rig: Rig, rig_home: Path, tmp_path: Path, page: int
 ) -> None:
     run = recorded(rig_home)
     sound = {number: kept.samples.volts.tobytes() for number, kept in _kept(rig_home, run).items()}

@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable
 from itertools import product
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -18,8 +17,8 @@ from procedures.questions import Confirm, Mounting
 from rig.drawings import Attitude, drawing_of, page, sketch, strip, svg
 from rig.drawings.attitude import NAMED
 from rig.drawings.rig_view import CAMERA_FROM, Camera, box, cylinder
+from tests.rig.conftest import Rig
 
-Rig = Callable[..., Any]
 SVG = "{http://www.w3.org/2000/svg}"
 ANGLES = product((-135.0, 0.0, 90.0, 180.0), (0.0, 200.0), (0.0, 45.0), (0, 1))
 EVERYWHERE = [*(Attitude(*angles) for angles in ANGLES), Attitude(45, 90, shaken=True)]

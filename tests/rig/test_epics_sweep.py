@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +9,13 @@ import pytest
 import yaml
 
 from tests.epics_ioc import serving
+from tests.rig.conftest import Rig
 
 SWEEP = ("--inclinations-deg", "90", "--step-deg", "90", "--dwell-s", "1", "--settle-s", "0.3", "--unattended")
 FAST = {"speed_deg_s": 200, "speed_limit_deg_s": 400, "acceleration_deg_s2": 4000}
 
 
-def swept(rig: Callable[..., Any], tmp_path: Path, adc: dict[str, Any], **stages: dict[str, Any]) -> list[float]:
+def swept(rig: Rig, tmp_path: Path, adc: dict[str, Any], **stages: dict[str, Any]) -> list[float]:
     """Scale factors of both axes, V/g, after a sweep."""
     instruments = {role: {"driver": "epics_motor", **stage} for role, stage in stages.items()}
     instruments["adc"] = {"driver": "epics_adc", **adc}
@@ -35,7 +35,7 @@ def swept(rig: Callable[..., Any], tmp_path: Path, adc: dict[str, Any], **stages
 
 @pytest.mark.slow
 @pytest.mark.sockets
-def test_simulated_records_turn_and_measure_the_simulated_sensor(rig: Callable[..., Any], tmp_path: Path) -> None:
+def test_simulated_records_turn_and_measure_the_simulated_sensor(rig: Rig, tmp_path: Path) -> None:
     stage = {"url": "simulated", "settings": FAST}
     adc = {"url": "simulated", "settings": {"channels": {"vx": "ai1", "vy": "ai2"}, "rate_hz": 20}}
     assert swept(rig, tmp_path, adc, alpha=stage, beta=stage) == pytest.approx([0.9744, 0.9943], rel=5e-3)
@@ -44,7 +44,7 @@ def test_simulated_records_turn_and_measure_the_simulated_sensor(rig: Callable[.
 @pytest.mark.slow
 @pytest.mark.sockets
 def test_an_ioc_of_others_is_found_turned_and_measured(
-    rig: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     settings = {**FAST, "deg_per_unit": 1.0}
     adc = {"url": "ca:test:", "settings": {"channels": {"vx": "ai1", "vy": "ai2"}, "rate_hz": 5}}

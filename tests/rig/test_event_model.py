@@ -14,10 +14,8 @@ from bluesky.callbacks.core import CollectThenCompute
 
 from rig.record import Record
 from rig.record.measured import table_of
-from tests.rig.conftest import Ended
+from tests.rig.conftest import Rig
 from tests.rig.pushing import POSES, a_run, a_table
-
-Rig = Callable[..., Ended]
 
 
 @pytest.fixture

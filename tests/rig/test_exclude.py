@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +13,9 @@ from rig.record import Record
 from rig.record.measured import table_of
 from rig.runs.runner import resume, start
 from rig.services.exclusion import RESULTS, exclude
+from tests.rig.conftest import Rig
 from tests.rig.rigging import POSES, Onlooker, sigterm_at, small_sweep
 
-Rig = Callable[..., Any]
 pytestmark = pytest.mark.sockets
 
 NOISE = ("run", "noise-floor", "--duration-s", "3", "--block-s", "1", "--dwell-s", "0.2", "--unattended", "--json")

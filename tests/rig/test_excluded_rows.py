@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,7 +10,7 @@ from calibrations.errors import DataError
 from calibrations.importing.foreign import write_csv
 from rig.services.tables import load
 from tests.calibrations.synthetic import components, poses, turns
-from tests.rig.conftest import Ended
+from tests.rig.conftest import Rig
 
 ROWS = ["alpha_deg,beta_deg,vx_v,excluded", "90,0,3.5,0", "90,90,9.9,1", "90,180,1.5,0"]
 
@@ -32,7 +31,7 @@ def test_a_file_cannot_exclude_all(golden, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["compare", "fit"])
-def test_a_fit_of_all_rows_names_those_that_stand_out(command: str, tmp_path: Path, rig: Callable[..., Ended]) -> None:
+def test_a_fit_of_all_rows_names_those_that_stand_out(command: str, tmp_path: Path, rig: Rig) -> None:
     columns = turns(step_deg=30.0)
     x, y, _ = components(columns)
     volts = 2.5 + x

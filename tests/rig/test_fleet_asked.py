@@ -28,6 +28,7 @@ from rig.record import Record
 from rig.web.pages.fleet import progress_text
 from tests.calibrations import turned
 from tests.calibrations.fleets import BETA, sensor
+from tests.rig.conftest import Rig
 
 RIPPLE = '''import numpy as np
 
@@ -60,7 +61,7 @@ def rippled(seed: int) -> Table:
 
 
 def test_a_users_own_effects_are_asked_for_and_sent_to_the_workers(
-    cluster: LocalCluster, tmp_path: Path, rig: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+    cluster: LocalCluster, tmp_path: Path, rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("RIG_HOME", str(tmp_path / "home"))
     effects, data = tmp_path / "effects", tmp_path / "data"

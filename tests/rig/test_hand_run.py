@@ -39,9 +39,9 @@ from rig.runs.background import status
 from rig.runs.runner import resume, start
 from rig.web.pages.run_begin import before_resume, before_start
 from tests.handling import FIELD_UT, true_ellipsoid, true_gyroscope
+from tests.rig.conftest import Rig
 from tests.rig.rigging import Onlooker
 
-Rig = Callable[..., Any]
 RUN = ("run", "hand-positions", "--bench", str(HAND), "--unattended", "--json")
 UP = (0.0, 0.0, 1.0)
 

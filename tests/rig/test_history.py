@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -18,9 +17,8 @@ from rig.errors import RecordError
 from rig.record import Record
 from rig.services.history import Calibration, History, Value, _most_frequent_kind, history, judge_history, latest
 from rig.services.history_comparison import compare_rigs
+from tests.rig.conftest import Rig
 from tests.rig.lives import COLUMNS, calibrated
-
-Rig = Callable[..., Any]
 
 
 @pytest.fixture

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pexpect
@@ -16,6 +14,7 @@ from calibrations.importing.plausible import find_time_doubt
 from calibrations.importing.units import ColumnMapping
 from rig.record import Record
 from rig.services.importing import column_words, doubt_of_time, open_file, proposal
+from tests.rig.conftest import Rig
 
 THEIRS = "Takt;inclination;table;Ux\n" + "".join(f"{k};90;{30 * k};{2500 + k}\n" for k in range(12))
 
@@ -32,7 +31,7 @@ def at_terminal(file: Path) -> pexpect.spawn[str]:
     return pexpect.spawn(sys.executable, words, encoding="utf-8", timeout=30, dimensions=(40, 200))
 
 
-def test_a_mapping_is_confirmed_corrected_and_can_be_repeated(file: Path, rig: Callable[..., Any]) -> None:
+def test_a_mapping_is_confirmed_corrected_and_can_be_repeated(file: Path, rig: Rig) -> None:
     with at_terminal(file) as terminal:
         for question, answer in (
             (r"\[poses\]: ", ""),

@@ -20,13 +20,12 @@ from rig.record.lab import prepare
 from rig.record.push import push
 from rig.record.schema import SCHEMA
 from rig.web.desk import runs as runs_of_workbench
-from tests.rig.conftest import WORD, Ended
+from tests.rig.conftest import WORD, Rig
 from tests.rig.cutting import after_bytes, wire
 from tests.rig.postgres import Server, free_port
 from tests.rig.pushing import a_run, held
 from tests.rig.rigging import POSES, SMALL_ARGUMENTS
 
-Rig = Callable[..., Ended]
 SWEEP = ("run", "sweep", *SMALL_ARGUMENTS, "--unattended")
 
 

@@ -17,13 +17,12 @@ from rig.files import RECORD
 from rig.record import Record
 from rig.services.tables import load_all
 from tests.calibrations.fitted import LINEAR, model
-from tests.rig.conftest import Ended, contents
+from tests.rig.conftest import Ended, Rig, contents
 from tests.rig.postgres import Server
 from tests.rig.pushing import pushed
 from tests.rig.test_control import QUIET, checks
 
 pytestmark = pytest.mark.sockets
-Rig = Callable[..., Ended]
 WORLD = {"preset": "ideal", "spread": {"imperfection_fraction": 0.0}, "noise": {"white_v": 1.5e-4}}
 SWEEP = ("--step-deg", "60", "--dwell-s", "0.2", "--inclinations-deg")
 MEASURED: Mapping[str, tuple[str, ...]] = {

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from rig.lab_url import lab_url
 from rig.record.lab import options
-from tests.rig.conftest import WORD, Ended
+from tests.rig.conftest import WORD, Rig
 from tests.rig.cutting import Judge, wire
 from tests.rig.postgres import Server
 from tests.rig.tls import Certificate, certificate, encrypting
 
-Rig = Callable[..., Ended]
 HOST = "lab.example"
 AT = f"{HOST}:{{port}}/{{database}}?hostaddr=127.0.0.1"  # a name of another machine, and where it really is
 

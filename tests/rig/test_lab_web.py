@@ -23,12 +23,10 @@ from rig.files import RECORD
 from rig.record import Record
 from rig.web.desk import Desk
 from rig.web.pages import register
-from tests.rig.conftest import WORD, Ended
+from tests.rig.conftest import WORD, Rig
 from tests.rig.postgres import Server
 from tests.rig.pushing import a_run, pushed
 from tests.rig.test_web_analyses import without_browser
-
-Rig = Callable[..., Ended]
 
 
 @pytest.fixture

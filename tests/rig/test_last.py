@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,7 +10,7 @@ import rig as application
 from rig.errors import RecordError, UnknownRun
 from rig.record import Record
 from rig.record.measured import MeasuredRun
-from tests.rig.conftest import Ended
+from tests.rig.conftest import Rig
 
 
 def begun(record: Record, procedure: str) -> str:
@@ -29,7 +28,7 @@ def test_the_last_run_and_the_last_of_a_procedure() -> None:
             record.run(sweep[:4])
 
 
-def test_the_last_of_a_procedure_needs_no_quotes(rig: Callable[..., Ended]) -> None:
+def test_the_last_of_a_procedure_needs_no_quotes(rig: Rig) -> None:
     with Record() as record:
         sweep, _ = begun(record, "sweep"), begun(record, "soak")
     assert rig("show", "last", "sweep").out.startswith(sweep)
@@ -94,7 +93,7 @@ def test_an_empty_record_has_no_last_run(golden) -> None:
     ],
     ids=lambda command: command[0],
 )
-def test_commands_take_the_last_run(rig: Callable[..., Ended], work: Path, command: tuple[str, ...]) -> None:
+def test_commands_take_the_last_run(rig: Rig, work: Path, command: tuple[str, ...]) -> None:
     run = rig("import", "good.csv", "--kind", "poses", "--json").document["run"]
     named, last = (rig(*command, data, "--json") for data in (run, "last"))
     assert named.status == last.status
@@ -102,6 +101,6 @@ def test_commands_take_the_last_run(rig: Callable[..., Ended], work: Path, comma
     assert (work / "good.csv").exists()
 
 
-def test_python_loads_the_last_run(rig: Callable[..., Ended], work: Path) -> None:
+def test_python_loads_the_last_run(rig: Rig, work: Path) -> None:
     rig("import", "good.csv", "--kind", "poses")
     assert application.load("last").digest == application.load("good.csv").digest

@@ -21,7 +21,7 @@ from rig.record.measured import table_of
 from rig.runs.live import FIRST, Live, Measurement, stands
 from tests.hidden.quick_rig import QuickRig
 from tests.hidden.rigs import IDEAL
-from tests.rig.conftest import Ended
+from tests.rig.conftest import Rig
 
 FAST_ADC = {"driver": "labjack_t7", "url": "simulated", "settings": {"channels": {"vx": 0, "vy": 1}, "rate_hz": 200}}
 TURNED = {"preset": "ideal", "sensor": {"package": {"turn_z_deg": 0.1}}}
@@ -50,7 +50,7 @@ def bench(bench_file: Callable[..., Path]) -> Callable[..., str]:
     ids=["turned", "bent"],
 )
 def test_the_cause_is_found_in_less_rig_time_than_the_standard_sweep(
-    rig: Callable[..., Ended], bench: Callable[..., str], tmp_path: Path, world: Any, cause: str
+    rig: Rig, bench: Callable[..., str], tmp_path: Path, world: Any, cause: str
 ) -> None:
     out = str(tmp_path / "found.yaml")
     ended = rig("discover", "--live", "--bench", bench(world), "--unattended", "--out", out, "--json")
@@ -72,7 +72,7 @@ def test_the_cause_is_found_in_less_rig_time_than_the_standard_sweep(
 
 
 @pytest.mark.sockets
-def test_what_fails_ends_it_and_what_was_measured_stays(rig: Callable[..., Ended], bench: Callable[..., str]) -> None:
+def test_what_fails_ends_it_and_what_was_measured_stays(rig: Rig, bench: Callable[..., str]) -> None:
     ended = rig(
         "discover", "--live", "--unattended", "--bench",
         bench(TURNED, beta={"faults": [{"what": "silence", "at_s": 100}]}),

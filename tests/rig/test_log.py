@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -14,6 +13,7 @@ from rig.bench import read_bench
 from rig.record import Record
 from rig.runs.runner import resume, start
 from rig.runs.signals import SHOWN_BYTES, message_text
+from tests.rig.conftest import Rig
 from tests.rig.misbehaving import afflicted
 from tests.rig.rigging import POSES, Onlooker, small_sweep
 
@@ -33,7 +33,7 @@ def test_a_message_is_shown_as_text_where_it_is_some(data: bytes, text: str) -> 
 
 
 @pytest.mark.sockets
-def test_a_run_tells_what_it_did_what_stopped_it_and_that_it_went_on(rig: Callable[..., Any]) -> None:
+def test_a_run_tells_what_it_did_what_stopped_it_and_that_it_went_on(rig: Rig) -> None:
     bench = read_bench()
     with Record() as record:
         broken = afflicted(bench, "alpha", Fault("alarm", at_s=30.0))
@@ -62,7 +62,7 @@ def test_a_run_tells_what_it_did_what_stopped_it_and_that_it_went_on(rig: Callab
 
 
 @pytest.mark.sockets
-def test_every_message_is_logged_on_request_and_shown(rig: Callable[..., Any], bench_file: Callable[..., Path]) -> None:
+def test_every_message_is_logged_on_request_and_shown(rig: Rig, bench_file: Callable[..., Path]) -> None:
     small = ("--step-deg", "180", "--dwell-s", "0.1", "--inclinations-deg", "90")
     ended = rig("run", "sweep", *small, "--unattended", "--json", "--trace")
     run = ended.document["run"]

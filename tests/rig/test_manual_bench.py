@@ -21,10 +21,10 @@ from rig.planning.plan import plan
 from rig.record import Record
 from rig.record.measured import table_of
 from rig.runs.runner import resume, start
+from tests.rig.conftest import Rig
 from tests.rig.rigging import Onlooker
 
 MARK_DEG = 5 / 60
-Rig = Callable[..., Any]
 SMALL = ("--inclinations-deg", "90", "--step-deg", "90", "--dwell-s", "0.2")
 
 

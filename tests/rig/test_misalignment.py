@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +17,9 @@ from rig.bench.result_names import names_with_limits
 from rig.planning.plan import plan
 from rig.record import Record
 from rig.runs.runner import start
+from tests.rig.conftest import Rig
 from tests.rig.rigging import Onlooker
 
-Rig = Callable[..., Any]
 PACKAGE = {"turn_x_deg": 0.75, "turn_y_deg": -1.3, "turn_z_deg": 0.33, "beams_off_square_deg": 0.17}
 KNOWN = {"preset": "ideal", "spread": {"imperfection_fraction": 0.0}, "sensor": {"package": PACKAGE}}
 

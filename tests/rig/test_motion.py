@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import islice, pairwise
 from pathlib import Path
@@ -27,6 +27,7 @@ from rig.record import KeptPose, Record
 from rig.record.measured import MeasuredRun
 from rig.runs.runner import Outcome, resume, start
 from rig.services.report import of_run
+from tests.rig.conftest import Rig
 from tests.rig.rigging import Onlooker
 from tests.slow import first_fast
 
@@ -272,7 +273,7 @@ def test_a_sensor_turned_on_its_mount_is_found_by_the_axis_that_should_not_move(
 
 
 @pytest.mark.slow
-def test_every_command_takes_a_motion_run(rig: Callable[..., Any], tmp_path: Path) -> None:
+def test_every_command_takes_a_motion_run(rig: Rig, tmp_path: Path) -> None:
     arguments = [part for name, value in BRIEF.items() for part in (f"--{name.replace('_', '-')}", value)]
     ended = rig("run", "motion", *arguments, "--unattended", "--json")
     document = ended.document

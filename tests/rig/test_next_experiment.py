@@ -29,7 +29,7 @@ from rig.services.next_experiment import planned
 from rig.services.request import Request
 from tests.hidden.quick_rig import QuickRig
 from tests.hidden.rigs import IDEAL
-from tests.rig.conftest import Ended
+from tests.rig.conftest import Rig
 
 PAIRS = (
     {"quadratic-nonlinearity", "bias"},
@@ -149,7 +149,7 @@ def test_the_oven_warms_over_minutes_and_time_goes_on() -> None:
     assert set(foreseen["dwell_s"]) == {5.0}
 
 
-def test_commands_print_the_next_experiment(rig: Callable[..., Ended], tmp_path: Path) -> None:
+def test_commands_print_the_next_experiment(rig: Rig, tmp_path: Path) -> None:
     from calibrations.importing.foreign import write_csv
 
     data = str(tmp_path / "turned.csv")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +15,8 @@ from procedures.session import Pose
 from rig.record import KeptPose, Record
 from rig.services.still import axes, coarse
 from tests import recorded
-from tests.rig.conftest import Ended
+from tests.rig.conftest import Rig
 
-Rig = Callable[..., Ended]
 PROCESSES = {
     "white-noise", "flicker-noise", "rate-random-walk", "quantisation-noise", "sinusoidal-noise", "gauss-markov-noise",
 }  # fmt: skip

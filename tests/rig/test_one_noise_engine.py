@@ -11,10 +11,9 @@ import pytest
 
 from tests.calibrations import hidden_noise
 from tests.calibrations.hidden_noise import RATE_HZ, RECORDS, SAMPLES, telegraph, walk, white
-from tests.rig.conftest import Ended
+from tests.rig.conftest import Rig
 from tests.slow import slow
 
-Rig = Callable[..., Ended]
 Array = np.ndarray
 Random = np.random.Generator
 K = np.arange(SAMPLES)

@@ -27,9 +27,8 @@ from rig.services.request import Request
 from rig.services.session import ModelSession, model_session
 from tests.browser.measured import wandering
 from tests.calibrations import shaken, synthetic, test_common_floor, turned
-from tests.rig.conftest import Ended
+from tests.rig.conftest import Rig
 
-Rig = Callable[..., Ended]
 MOST_STEPS = 20
 MOST_MODULES = 150
 LIKELY = 0.5

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -25,6 +25,7 @@ from rig.planning.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, o
 from rig.planning.planned import EXCHANGE_S, from_home_s, moves_s
 from rig.record import KeptPose, Record
 from rig.runs.runner import resume, start
+from tests.rig.conftest import Rig
 from tests.rig.rigging import Onlooker
 from tests.slow import first_fast
 
@@ -137,7 +138,7 @@ def test_what_no_sweep_tells_has_no_ratio() -> None:
     assert optimal_document(found)["same_dwell"]["errors"]["temperature-bias slope x"] is None
 
 
-def test_the_command_writes_poses_that_a_run_takes(rig: Callable[..., Any], tmp_path: Path) -> None:
+def test_the_command_writes_poses_that_a_run_takes(rig: Rig, tmp_path: Path) -> None:
     out = tmp_path / "poses.csv"
     small = ("--step-deg", "30", "--inclinations-deg", "90,45,135")
     ended = rig("plan", "sweep", *small, "--optimal", "--poses", "20", "--out", str(out), "--json")
@@ -149,20 +150,20 @@ def test_the_command_writes_poses_that_a_run_takes(rig: Callable[..., Any], tmp_
     assert planned["settings"]["pose_list"] == out.read_text().splitlines()
 
 
-def test_any_plan_s_poses_can_be_written(rig: Callable[..., Any], tmp_path: Path) -> None:
+def test_any_plan_s_poses_can_be_written(rig: Rig, tmp_path: Path) -> None:
     out = tmp_path / "poses.csv"
     rig("plan", "sweep", "--step-deg", "180", "--inclinations-deg", "90", "--out", str(out))
     assert out.read_text().splitlines()[1:3] == ["90,0,1,A+ to B-,0,0", "90,180,1,A+ to B-,0,0"]
 
 
-def test_options_of_chosen_poses_need_optimal(rig: Callable[..., Any]) -> None:
+def test_options_of_chosen_poses_need_optimal(rig: Rig) -> None:
     assert rig("plan", "sweep", "--poses", "20").status == 2
     assert rig("plan", "soak", "--optimal").status == 2
 
 
 @pytest.mark.slow
 @pytest.mark.sockets
-def test_a_run_of_chosen_poses_checks_its_model(rig: Callable[..., Any], tmp_path: Path, rig_home: Path) -> None:
+def test_a_run_of_chosen_poses_checks_its_model(rig: Rig, tmp_path: Path, rig_home: Path) -> None:
     out = tmp_path / "poses.csv"
     rig(
         "plan",

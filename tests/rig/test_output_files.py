@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Iterator
 from errno import ENOSPC
 from pathlib import Path
-from typing import Any
 
 import click
 import pytest
@@ -18,8 +17,8 @@ from rig import files
 from rig.cli import COMMANDS
 from rig.cli import rig as program
 from rig.errors import OutputError
+from tests.rig.conftest import Rig
 
-Rig = Callable[..., Any]
 OLD = "what was there before"
 OUTPUTS = {"out", "picture", "report", "folder"}  # parameters that name an output
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,8 +12,8 @@ import yaml
 
 from calibrations.importing.foreign import write_csv
 from tests.calibrations.synthetic import NOISE_V, components, poses, turns
+from tests.rig.conftest import Rig
 
-Rig = Callable[..., Any]
 SCREW = "beta_deg += a*sin(5*beta) + b*cos(5*beta)"
 
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from tests.calibrations.synthetic import components, turns
+from tests.rig.conftest import Rig
 
-Rig = Callable[..., Any]
 MAPPED = ("--column", "alpha_deg=tilt", "--column", "beta_deg=table", "--column", "vx_v=Ux:mV")
 
 

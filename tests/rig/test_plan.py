@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from rig.planning.plan import plan
 from rig.record import Record
 from rig.runs.runner import start
 from tests.recorded import command
+from tests.rig.conftest import Rig
 from tests.rig.rigging import Onlooker, small_sweep
 
 
@@ -110,15 +110,13 @@ def test_a_plan_includes_the_oven(tmp_path: Path) -> None:
         (("misalignment", "--most-rounds", "4000"), "64000 poses; the limit is 50000; give a smaller most_rounds"),
     ],
 )
-def test_a_plan_without_bound_is_refused_before_it_is_built(
-    rig: Callable[..., Any], words: tuple[str, ...], said: str
-) -> None:
+def test_a_plan_without_bound_is_refused_before_it_is_built(rig: Rig, words: tuple[str, ...], said: str) -> None:
     ended = rig("plan", *words)
     assert (ended.status, f"the plan has {said}" in ended.err) == (2, True), ended.err
 
 
 @pytest.mark.parametrize("name", ["sweep", "misalignment", "repeat"])
-def test_a_dwell_that_no_memory_holds_is_refused(rig: Callable[..., Any], name: str) -> None:
+def test_a_dwell_that_no_memory_holds_is_refused(rig: Rig, name: str) -> None:
     ended = rig("plan", name, "--dwell-s", "1e7")
     assert (ended.status, "give a shorter dwell_s" in ended.err) == (2, True), ended.err
 

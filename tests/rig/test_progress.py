@@ -14,9 +14,7 @@ import pytest
 
 from rig.cli.terminal import compiling, progress
 from rig.cli.terminal.output import note
-from tests.rig.conftest import Ended
-
-Rig = Callable[..., Ended]
+from tests.rig.conftest import Rig
 
 
 class Stream(io.StringIO):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +15,8 @@ from rig.bench.result_names import names_with_limits
 from rig.instruments.instruments import connect_all
 from rig.planning.plan import plan
 from rig.record import Record
+from tests.rig.conftest import Rig
 
-Rig = Callable[..., Any]
 FAST = ("--dwell-s", "0.2", "--unattended", "--json")
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from calibrations.importing.foreign import write_csv
 from tests.calibrations.test_pictures import warm_table
+from tests.rig.conftest import Rig
 
 NAMES = [
     "waterfall",
@@ -28,7 +27,7 @@ def data(tmp_path: Path) -> str:
     return str(tmp_path / "warm.csv")
 
 
-def test_the_report_command_writes_a_page_and_pictures(rig: Callable[..., Any], data: str, tmp_path: Path) -> None:
+def test_the_report_command_writes_a_page_and_pictures(rig: Rig, data: str, tmp_path: Path) -> None:
     out, folder = tmp_path / "page.html", tmp_path / "pictures"
     ended = rig("report", data, "--model", "linear", "--out", str(out), "--pictures", str(folder), "--json")
     document = ended.done().document
@@ -41,7 +40,7 @@ def test_the_report_command_writes_a_page_and_pictures(rig: Callable[..., Any], 
 
 
 @pytest.mark.slow
-def test_the_report_command_writes_pictures_alone(rig: Callable[..., Any], data: str, tmp_path: Path) -> None:
+def test_the_report_command_writes_pictures_alone(rig: Rig, data: str, tmp_path: Path) -> None:
     ended = rig("report", data, "--pictures", str(tmp_path / "p"), "--format", "svg")
     assert ended.status == 0, ended.err
     assert ended.out.count("written: ") == len(NAMES)
@@ -58,7 +57,7 @@ def test_the_report_command_writes_pictures_alone(rig: Callable[..., Any], data:
     ],
 )
 def test_bad_usage_writes_nothing(
-    rig: Callable[..., Any], data: str, tmp_path: Path, arguments: tuple[str, ...], message: str
+    rig: Rig, data: str, tmp_path: Path, arguments: tuple[str, ...], message: str
 ) -> None:
     ended = rig("report", data, *(argument.format(tmp=tmp_path) for argument in arguments))
     assert ended.status == 2

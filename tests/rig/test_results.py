@@ -1,6 +1,5 @@
 """Results: their verdicts, which allow for the uncertainty, and their meanings in words."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +15,7 @@ from rig.record import Record
 from rig.record.measured import table_of
 from rig.results import Result, documents, read_returned
 from rig.results.evaluate import MODULES
-
-Rig = Callable[..., Any]
+from tests.rig.conftest import Rig
 
 
 @pytest.mark.parametrize(

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import pytest
 
 from rig.record import Record
+from tests.rig.conftest import Rig
 from tests.rig.rigging import sigterm_at
 from tests.slow import first_fast
 
@@ -26,7 +24,7 @@ UNATTENDED = ("--dwell-s", "0.2", "--unattended", "--json")
         ]
     ),
 )
-def test_it_goes_on_sample_for_sample(procedure: tuple[str, ...], at_pose: int, rig: Callable[..., Any]) -> None:
+def test_it_goes_on_sample_for_sample(procedure: tuple[str, ...], at_pose: int, rig: Rig) -> None:
     whole = rig("run", *procedure, *UNATTENDED).document["run"]
     with sigterm_at(at_pose):
         assert rig("run", *procedure, *UNATTENDED).status == 4

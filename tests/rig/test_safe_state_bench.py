@@ -12,6 +12,7 @@ import yaml
 from rig.bench import DEFAULT, read_bench
 from rig.errors import BenchError
 from rig.record import Record
+from tests.rig.conftest import Rig
 from tests.rig.rigging import SMALL_ARGUMENTS
 
 
@@ -56,7 +57,7 @@ def test_a_real_instrument_is_given_no_faults(golden, bench_file: Callable[..., 
 
 
 @pytest.mark.sockets
-def test_a_run_fails_is_repaired_and_goes_on(bench_file: Callable[..., Path], rig: Callable[..., Any]) -> None:
+def test_a_run_fails_is_repaired_and_goes_on(bench_file: Callable[..., Path], rig: Rig) -> None:
     fault = {"what": "flipped-bit", "at_s": 40, "size": 20}
     broken = bench_file(with_faults("beta", fault))
     failed = rig("run", "sweep", *SMALL_ARGUMENTS, "--bench", str(broken), "--unattended", "--json")
@@ -73,6 +74,6 @@ def test_a_run_fails_is_repaired_and_goes_on(bench_file: Callable[..., Path], ri
 
 
 @pytest.mark.sockets
-def test_a_plan_is_made_with_sound_instruments(bench_file: Callable[..., Path], rig: Callable[..., Any]) -> None:
+def test_a_plan_is_made_with_sound_instruments(bench_file: Callable[..., Path], rig: Rig) -> None:
     path = bench_file(with_faults("alpha", {"what": "silence"}))
     assert rig("plan", "misalignment", "--most-rounds", "1", "--dwell-s", "0.1", "--bench", str(path)).status == 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import yaml
 from drivers.clock import serve_forever
 from rig.bench import Bench
 from rig.instruments.wiring import serve, world_of
+from tests.rig.conftest import Rig
 
 SWEEP = ("--inclinations-deg", "90", "--step-deg", "90", "--dwell-s", "0.5", "--settle-s", "0.3", "--unattended")
 STAGE = {
@@ -34,7 +35,7 @@ BENCH = {
 }
 
 
-def swept(rig: Callable[..., Any], tmp_path: Path, bench: dict[str, Any]) -> tuple[float, float]:
+def swept(rig: Rig, tmp_path: Path, bench: dict[str, Any]) -> tuple[float, float]:
     """Scale factors of both axes, V/g, after a sweep."""
     file = tmp_path / "scpi.yaml"
     file.write_text(yaml.safe_dump(bench))
@@ -71,12 +72,12 @@ def lab() -> Iterator[dict[str, Any]]:
 
 @pytest.mark.slow
 @pytest.mark.sockets
-def test_a_simulated_scanner_measures_the_simulated_sensor(rig: Callable[..., Any], tmp_path: Path) -> None:
+def test_a_simulated_scanner_measures_the_simulated_sensor(rig: Rig, tmp_path: Path) -> None:
     assert swept(rig, tmp_path, BENCH) == pytest.approx(SCALE_V_PER_G, rel=2e-3)
 
 
 @pytest.mark.slow
 @pytest.mark.sockets
-def test_through_pyvisa_it_measures_the_same(rig: Callable[..., Any], tmp_path: Path, lab: dict[str, Any]) -> None:
+def test_through_pyvisa_it_measures_the_same(rig: Rig, tmp_path: Path, lab: dict[str, Any]) -> None:
     pytest.importorskip("pyvisa_py")
     assert swept(rig, tmp_path, lab) == pytest.approx(SCALE_V_PER_G, rel=2e-3)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,8 +12,8 @@ from calibrations.files import text_source
 from calibrations.importing.other_texts import as_lines
 from tests.calibrations.turned import DATA
 from tests.foreign_files import read_foreign
+from tests.rig.conftest import Rig
 
-Rig = Callable[..., Any]
 NAMES = [f"{ours}{axis}={theirs}_{axis}" for ours, theirs in (("a", "acc"), ("g", "gyr")) for axis in "xyz"]
 SESSION = ("--kind", "rates", *(word for name in ["path=part", *NAMES] for word in ("--column", name)))
 RATE, TURN = ("--constant", "sample_rate_hz=204.8"), ("--constant", "turn_deg=360")

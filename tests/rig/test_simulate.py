@@ -20,6 +20,7 @@ from drivers.transport import Address, Links
 from rig.bench import DEFAULT, read_bench
 from rig.errors import Busy
 from rig.instruments.instruments import connect_all
+from tests.rig.conftest import Rig
 
 pytestmark = pytest.mark.sockets
 
@@ -62,7 +63,7 @@ def test_a_signal_ends_it_in_good_order(served: Any, number: signal.Signals) -> 
     assert child.stderr.read() == ""
 
 
-def test_the_signals_are_given_back(rig: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_signals_are_given_back(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     def ended_by_both(servers: object, until: Callable[[], bool], clock: object) -> None:
         assert not until()
         for each in ENDING:
@@ -77,7 +78,7 @@ def test_the_signals_are_given_back(rig: Callable[..., Any], monkeypatch: pytest
 
 @pytest.mark.slow
 def test_a_bench_of_which_a_part_is_real_runs_in_real_time(
-    served: Any, bench_file: Callable[..., Path], rig: Callable[..., Any]
+    served: Any, bench_file: Callable[..., Path], rig: Rig
 ) -> None:
     _, document = served
     instruments = yaml.safe_load(DEFAULT.read_text())["instruments"]

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import random
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,11 +22,11 @@ from rig.results.soak import read_soak
 from rig.runs.estimates import SoakForecaster, lines, outlook
 from rig.runs.runner import resume, start
 from rig.services.exclusion import exclude
+from tests.rig.conftest import Rig
 from tests.rig.nursery import Harm, Nursery
 from tests.rig.rigging import Onlooker, sigterm_at
 
 pytestmark = pytest.mark.sockets
-Rig = Callable[..., Any]
 NIGHT = ("--block-s", "450", "--unattended", "--json")
 SHORT = {"duration_s": 60.0, "interval_s": 20.0, "block_s": 5.0}
 SHORT_RUN = ("soak", "--duration-s", "60", "--interval-s", "20", "--dwell-s", "0.2", "--settle-s", "0", "--unattended")

@@ -16,9 +16,8 @@ from calibrations.table import Array
 from tests import recorded
 from tests.calibrations.hidden_noise import RATE_HZ, fractional, traps, white
 from tests.calibrations.ramps import record
-from tests.rig.conftest import Ended
+from tests.rig.conftest import Rig
 
-Rig = Callable[..., Ended]
 N = 6000
 COMMANDS = ("compare", "fit", "diagnose", "discover", "report", "add")
 

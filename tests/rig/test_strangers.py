@@ -25,6 +25,7 @@ from drivers.transport.address import Url
 from procedures.catalogue import find
 from rig.bench import read_bench
 from rig.errors import BenchError
+from tests.rig.conftest import Rig
 
 BOMB = "a0: &a0 [x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 10)
@@ -118,9 +119,7 @@ def test_a_link_that_a_person_has_put_there_may_lead_out(bench_file: Callable[..
     assert read_bench(bench_file({"folders": {"effects": "mine"}})).folders.effects == elsewhere
 
 
-def test_a_model_file_loads_no_effect_from_beside_it(
-    tmp_path: Path, rig: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_model_file_loads_no_effect_from_beside_it(tmp_path: Path, rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "evil.py").write_text("open('ran', 'w')")
     (tmp_path / "theirs.yaml").write_text(PAGE + "- effect: evil\n")
     (tmp_path / "data.csv").write_text("alpha_deg,beta_deg,vx_v\n" + "".join(f"90,{10 * k},2.5\n" for k in range(36)))
@@ -173,7 +172,7 @@ WRITERS = (
 
 @pytest.mark.parametrize("words", WRITERS, ids=lambda words: words[0])
 def test_a_device_is_not_overwritten(
-    rig: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...]
+    rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("data.csv").write_text("alpha_deg,beta_deg,vx_v\n90,0,2.5\n90,90,3.5\n")
@@ -183,14 +182,14 @@ def test_a_device_is_not_overwritten(
     assert Path(words[-1]).is_fifo()
 
 
-def test_one_time_for_all_poses_is_no_fault_of_the_program(rig: Callable[..., Any], tmp_path: Path) -> None:
+def test_one_time_for_all_poses_is_no_fault_of_the_program(rig: Rig, tmp_path: Path) -> None:
     rows = (f"{a},{b},{2.5 + math.sin(a) * math.cos(b):.4f},100" for a in (90, 45) for b in range(0, 360, 15))
     (tmp_path / "data.csv").write_text("\n".join(["alpha_deg,beta_deg,vx_v,t_s", *rows]))
     ended = rig("fit", str(tmp_path / "data.csv"), "--out", str(tmp_path / "out.yaml"))
     assert ended.status in (0, 1), ended.err
 
 
-def test_an_archive_named_as_an_array_is_refused(golden, rig: Callable[..., Any], tmp_path: Path) -> None:
+def test_an_archive_named_as_an_array_is_refused(golden, rig: Rig, tmp_path: Path) -> None:
     np.savez(tmp_path / "two.npz", a=np.zeros(9))
     (tmp_path / "two.npz").rename(tmp_path / "two.npy")
     ended = rig("noise", str(tmp_path / "two.npy"), "--rate", "100")

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import pytest
 
 from procedures.catalogue import find
@@ -13,9 +10,8 @@ from procedures.settings import parse
 from rig.bench import read_bench
 from rig.planning.plan import Plan, plan, stretches, turn_words
 from rig.planning.planned import PlannedDwell, Step
+from tests.rig.conftest import Rig
 from tests.rig.rigging import ON_STAGES
-
-Rig = Callable[..., Any]
 
 
 def planned(name: str, **settings: str) -> Plan:

@@ -20,9 +20,9 @@ from rig.bench import DEFAULT, read_bench
 from rig.record import Record
 from rig.record.measured import RATE, table_of
 from rig.runs.runner import start
+from tests.rig.conftest import Rig
 from tests.rig.rigging import Onlooker
 
-Rig = Callable[..., Any]
 FIELD = ("magnetometer-turn", "--step-deg", "45", "--dwell-s", "0.1", "--settle-s", "0.1", "--unattended", "--json")
 RATES = ("rate-turn", "--rates-deg-s", "80", "--rest-s", "0.5", "--unattended", "--json")
 ONE = ("--mounts", "1")

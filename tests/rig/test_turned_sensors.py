@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,8 +10,7 @@ import pytest
 from calibrations.importing.foreign import write_csv
 from calibrations.table import Table
 from tests.calibrations import turned
-
-Rig = Callable[..., Any]
+from tests.rig.conftest import Rig
 
 
 def written(table: Table, path: Path) -> str:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +11,7 @@ from calibrations.discovery.plausibility import findings
 from calibrations.importing.foreign import write_csv
 from calibrations.table import Table
 from tests.calibrations.test_plausibility import DEAD, healthy, two_sensors
+from tests.rig.conftest import Rig
 from tests.rig.measurement_files import GOOD
 from tests.rig.wrong_measurements import WRONG
 
@@ -26,7 +25,7 @@ def dead(tmp_path: Path) -> str:
 
 
 @pytest.mark.parametrize("command", ["fit", "compare", "diagnose", "discover"])
-def test_exit_status_and_verdict_without_check(rig: Callable[..., Any], dead: str, command: str) -> None:
+def test_exit_status_and_verdict_without_check(rig: Rig, dead: str, command: str) -> None:
     ended = rig(command, dead, "--json")
     assert ended.status == 1, ended.err
     document = ended.document
@@ -35,7 +34,7 @@ def test_exit_status_and_verdict_without_check(rig: Callable[..., Any], dead: st
     assert REASON in rig(command, dead).out
 
 
-def test_unusable_data_write_no_file(rig: Callable[..., Any], dead: str, tmp_path: Path) -> None:
+def test_unusable_data_write_no_file(rig: Rig, dead: str, tmp_path: Path) -> None:
     out = str(tmp_path / "out")
     for arguments in (
         ("fit", dead, "--out", f"{out}.yaml"),
@@ -49,7 +48,7 @@ def test_unusable_data_write_no_file(rig: Callable[..., Any], dead: str, tmp_pat
     assert [path.name for path in tmp_path.iterdir()] == ["dead.csv"]
 
 
-def test_an_axis_of_noise_shows_in_the_magnitude_of_the_others(rig: Callable[..., Any], tmp_path: Path) -> None:
+def test_an_axis_of_noise_shows_in_the_magnitude_of_the_others(rig: Rig, tmp_path: Path) -> None:
     file, path = WRONG["positions"]["an axis holds noise only"](GOOD["positions"]()), tmp_path / "dead.csv"
     path.write_text(file.text())
     for command, out in (("fit", "m.yaml"), ("certificate", "c.xml")):
@@ -66,7 +65,7 @@ def test_an_axis_that_no_position_turns_is_not_dead() -> None:
 
 
 @pytest.mark.parametrize("share", [0.05, 0.1])
-def test_values_that_cannot_be_used_are_not_certified(rig: Callable[..., Any], tmp_path: Path, share: float) -> None:
+def test_values_that_cannot_be_used_are_not_certified(rig: Rig, tmp_path: Path, share: float) -> None:
     """An output that died at the end of the run: too few rows to tell it from other mistakes."""
     file = GOOD["poses"]()
     dead = file.changed(vx_v=np.where(np.arange(file.n) > (1 - share) * file.n, 2.5, file.columns["vx_v"]))
@@ -77,7 +76,7 @@ def test_values_that_cannot_be_used_are_not_certified(rig: Callable[..., Any], t
 
 
 @pytest.mark.parametrize("command", ["fit", "compare", "diagnose", "discover"])
-def test_two_sensors_fail_every_check(rig: Callable[..., Any], tmp_path: Path, command: str) -> None:
+def test_two_sensors_fail_every_check(rig: Rig, tmp_path: Path, command: str) -> None:
     path = tmp_path / "two.csv"
     write_csv(two_sensors(healthy()).table(), path)
     assert rig(command, str(path)).status == 0

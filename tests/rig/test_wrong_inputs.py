@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
+
+from tests.rig.conftest import Rig
 
 HEAD = "alpha_deg,beta_deg,vx_v"
 GOOD = f"{HEAD}\n" + "".join(f"90,{45 * k},{2.5 + 0.1 * k:.1f}\n" for k in range(8))
@@ -133,9 +134,7 @@ PLANS = [  # a procedure, a setting and its value
 
 
 @pytest.fixture
-def refused(
-    rig: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Callable[[tuple[str, ...]], str]:
+def refused(rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[tuple[str, ...]], str]:
     """The message of a command that must be refused; the folder holds good.csv."""
     monkeypatch.chdir(tmp_path)
     Path("good.csv").write_text(GOOD)

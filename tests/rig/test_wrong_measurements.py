@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from calibrations.effects.catalogue import catalogue
 from calibrations.model.file import dump_model, read_model
+from tests.rig.conftest import Rig
 from tests.rig.measurement_files import GOOD
 from tests.rig.wrong_answers import HARMLESS, REFUSED, SILENT, WARNED, answer
 from tests.rig.wrong_measurements import UNSEEN, WRONG
@@ -81,7 +80,7 @@ SAID = {
 
 @pytest.mark.parametrize(("command", "stage"), [("fit", "alpha"), ("fit", "beta"), ("compare", "alpha")])
 def test_a_stage_zero_that_is_off_is_named_unless_the_model_has_it(
-    rig: Callable[..., Any], tmp_path: Path, command: str, stage: str
+    rig: Rig, tmp_path: Path, command: str, stage: str
 ) -> None:
     wrong = WRONG["poses"][f"the zero of {stage} is off by 3 deg"](GOOD["poses"]())
     (tmp_path / "wrong.csv").write_text(wrong.text())
@@ -101,7 +100,7 @@ def test_a_stage_zero_that_is_off_is_named_unless_the_model_has_it(
         *slow(product(("diagnose", "discover"), list(SAID)[2:])),  # a search of seconds
     ],
 )
-def test_every_command_names_a_wrong_input(rig: Callable[..., Any], tmp_path: Path, command: str, name: str) -> None:
+def test_every_command_names_a_wrong_input(rig: Rig, tmp_path: Path, command: str, name: str) -> None:
     wrong = WRONG["poses"][name](GOOD["poses"]())
     (tmp_path / "wrong.csv").write_text(wrong.text())
     ended = rig(command, str(tmp_path / "wrong.csv"), "--model", "linear", "--json")
