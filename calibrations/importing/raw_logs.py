@@ -91,6 +91,8 @@ def is_raw_log(table: Table) -> bool:
 def still_intervals(samples: Array, rate_hz: float) -> list[tuple[int, int]]:
     """First row and end row of each still interval; `samples` has shape (n, 3)."""
     width = max(4, round(WINDOW_S * rate_hz))
+    if len(samples) < width:
+        return []
     spread = _moving_std(samples, width)
     quiet = float(np.quantile(spread, QUIET_QUANTILE))
     if np.max(spread) < LEAST_HANDLED_SPREAD * quiet:

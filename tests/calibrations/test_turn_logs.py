@@ -54,6 +54,10 @@ def test_an_imported_log_of_turns_is_the_same_when_it_is_read_again(tmp_path: Pa
 def test_a_log_with_too_few_rests_or_without_times_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"found [0-6] rests; a gyroscope needs 7 or more"):
         read_foreign(log(tmp_path, 4), "turns")
+    whole = log(tmp_path)
+    whole.write_text("".join(whole.read_text().splitlines(keepends=True)[:6]))  # fewer rows than a rest has
+    with pytest.raises(DataError, match=r"found 0 rests; a gyroscope needs 7 or more"):
+        read_foreign(whole, "turns")
     with pytest.raises(MissingConstant, match="needs the column t_s, or the constant sample_rate_hz"):
         read_foreign(log(tmp_path, 12, "t_s"), "turns")
     assert read_foreign(log(tmp_path, 12, "t_s"), "turns", constants={"sample_rate_hz": 100.0}).kind == "turns"
