@@ -1,7 +1,8 @@
 """Every fault of every instrument in every procedure, at random moments: `python -m tests.benchmark.faults [MOMENTS]`.
 
 Each run must end complete and right, or stopped safely with a run that goes on (tests/rig/enduring.py); the first that
-does not is named, and makes the exit status 1. With `--page`, the table in docs/faults.md is written anew.
+does not is named, and makes the exit status 1. With `--page`, the table in docs/faults.md is written anew; what was not
+tried this time stays there in parentheses. With `--out FILE`, cases that the file has are not tried again.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import sys
 import time
 from collections import Counter
@@ -85,17 +87,16 @@ def main() -> int:
         for seed in range(asked.moments)
         if not asked.drivers or (driver or DRIVERS[role]) in asked.drivers.split(",")
     ]
-    wanted = wanted[:: asked.every]
+    known = [] if asked.out is None else read(asked.out)
+    done_already = {_asked(case) for case in known}
+    wanted = [case for case in wanted[:: asked.every] if _asked(case) not in done_already]
     began = time.perf_counter()
     with TemporaryDirectory() as home:
         os.environ["RIG_HOME"] = home
         with ProcessPoolExecutor(asked.processes) as pool:
             run = [_kept(case, asked.out) for case in pool.map(tried, wanted)]
     impossible = sorted({f"{case.procedure} with {case.row[0]}" for case in run if case.end == IMPOSSIBLE})
-    done = [case for case in run if case.end != IMPOSSIBLE]
-    if asked.out:
-        done = [Case(**json.loads(line)) for line in asked.out.read_text(encoding="utf-8").splitlines()]
-        done = [case for case in done if case.end != IMPOSSIBLE]
+    done = [case for case in (*known, *run) if case.end != IMPOSSIBLE]
     if asked.page:
         write(done)
     broken = [case for case in done if case.end == BROKEN]
@@ -105,6 +106,17 @@ def main() -> int:
     for case in broken:
         print(f"{case.procedure}, {case.row}, {case.what}, seed {case.seed}: {case.why}", file=sys.stderr)
     return int(bool(broken))
+
+
+def read(file: Path) -> list[Case]:
+    """The cases of a file, which need not exist yet."""
+    lines = file.read_text(encoding="utf-8").splitlines() if file.exists() else []
+    return [Case(**json.loads(line)) for line in lines]
+
+
+def _asked(case: Case) -> Case:
+    """The case without what became of it."""
+    return replace(case, end="", why="")
 
 
 def _kept(case: Case, out: Path | None) -> Case:
@@ -119,7 +131,8 @@ def write(done: list[Case]) -> None:
     """Both tables in the page, made anew."""
     text = PAGE.read_text(encoding="utf-8")
     text = _between(text, KINDS, kinds())
-    PAGE.write_text(_between(text, TABLE, table(done)) if done else text, encoding="utf-8")
+    made = table(done, cells(text.partition(TABLE[0])[2].partition(TABLE[1])[0]))
+    PAGE.write_text(_between(text, TABLE, made) if done else text, encoding="utf-8")
 
 
 def _between(text: str, marks: tuple[str, str], new: str) -> str:
@@ -128,8 +141,19 @@ def _between(text: str, marks: tuple[str, str], new: str) -> str:
     return f"{head}{marks[0]}{new}{marks[1]}{tail}"
 
 
-def table(done: list[Case]) -> str:
-    """Faults by driver, in rows, against procedures: the letters of how each run ended, the most frequent first."""
+def cells(made: str) -> dict[tuple[str, str], dict[str, str]]:
+    """Driver and fault -> procedure -> letters, of a table that was made earlier."""
+    head, *rows = re.findall(r"^\| ([\w-]+) \| ([\w-]+) \| (.*) \|$", made, re.MULTILINE) or [("", "", "")]
+    columns = head[2].split(" | ")
+    texts = {(driver, what): [cell.strip(" ()") for cell in row.split("|")] for driver, what, row in rows[1:]}
+    return {key: dict(zip(columns, row, strict=True)) for key, row in texts.items()}
+
+
+def table(done: list[Case], earlier: Mapping[tuple[str, str], Mapping[str, str]]) -> str:
+    """Faults by driver, in rows, against procedures: the letters of how each run ended, the most frequent first.
+
+    A case that was not tried now has the letters of the earlier table, in parentheses.
+    """
     procedures = PROCEDURES
     rows: dict[tuple[str, str], dict[str, Counter[str]]] = {}
     for case in done:
@@ -139,12 +163,17 @@ def table(done: list[Case]) -> str:
     lines = [f"{len(done)} runs, {guided} of them guided: {_summary(done)}.\n",
              f"| driver | fault | {' | '.join(procedures)} |",
              f"| --- | --- | {' | '.join('---' for _ in procedures)} |"]  # fmt: skip
-    lines += [f"| {driver} | {what} | {_cells(row, procedures)} |" for (driver, what), row in sorted(rows.items())]
+    for driver, what in sorted({*rows, *earlier}):
+        letters = [_letters(rows.get((driver, what), {}), earlier.get((driver, what), {}), p) for p in procedures]
+        lines.append(f"| {driver} | {what} | {' | '.join(letters)} |")
     return "\n".join(lines) + "\n"
 
 
-def _cells(row: Mapping[str, Counter[str]], procedures: list[str]) -> str:
-    return " | ".join(" ".join(letter for letter, _ in row.get(p, Counter()).most_common()) for p in procedures)
+def _letters(now: Mapping[str, Counter[str]], before: Mapping[str, str], procedure: str) -> str:
+    """One cell."""
+    if procedure in now:
+        return " ".join(letter for letter, _ in now[procedure].most_common())
+    return f"({before[procedure]})" if before.get(procedure) else ""
 
 
 def _summary(done: list[Case]) -> str:

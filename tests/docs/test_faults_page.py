@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from tests.benchmark.faults import DRIVERS, PAGE, ROWS, TABLE, kinds
+from tests.benchmark.faults import DRIVERS, PAGE, ROWS, TABLE, Case, cells, kinds, table
 from tests.rig.enduring import FAULTS, PROCEDURES
 
 TEXT = PAGE.read_text(encoding="utf-8")
@@ -21,3 +21,14 @@ def test_no_fault_of_any_procedure_was_broken_when_the_table_was_made() -> None:
     rows = re.findall(r"^\| (\w+) \| ([\w-]+) \| (.*) \|$", made, re.MULTILINE)[1:]
     assert of_bench <= {(driver, what) for driver, what, _ in rows} <= ROWS
     assert all(len(cells.split("|")) == len(PROCEDURES) for *_, cells in rows)
+
+
+def test_what_was_not_tried_now_stays_in_parentheses() -> None:
+    first = [Case("sweep", "alpha", "stuck", 0, "stopped"), Case("repeat", "alpha", "stuck", 0, "complete")]
+    second = [Case("sweep", "beta", "stuck", 1, "complete", guided=True)]
+    made = table(second, cells(table(first, {})))
+    assert made.startswith("1 runs, 1 of them guided: 1 complete, 0 BROKEN.\n")
+    ends = cells(made)["oriental_az", "stuck"]
+    assert (ends["sweep"], ends["repeat"], ends["soak"]) == ("c", "c", "")
+    assert "| (c) |" in made
+    assert table(second, cells(made)) == made
