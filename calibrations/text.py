@@ -21,6 +21,7 @@ MOST_DECIMALS = 12  # of the concise form; smaller uncertainties are written out
 INFINITE_FREEDOM = 1e4  # degrees of freedom from which on ∞ is written
 FREEDOM_ROUNDING = 1e-6  # of a number of degrees of freedom
 NEGLIGIBLE = 1e-3  # share of the combined uncertainty, from which on a source shows in its digits
+LEAST_MILLI = 0.1  # below, thousandths of a unit are written as millionths
 LARGE_STD = 100.0  # from here on the digits in brackets would be before the decimal point
 
 
@@ -144,6 +145,13 @@ def quantity(value: float, unit_name: str) -> str:
 def in_milli(unit_name: str) -> tuple[float, str]:
     """Factor and unit that make small outputs readable: mV, mg and mm/s^2; other units stay as they are."""
     return (1e3, f"m{unit_name}") if unit_name.partition("/")[0] in ("V", "g", "m") else (1.0, unit_name)
+
+
+def milli_amount(value: float, unit_name: str, digits: int = 3) -> str:
+    """A value in a unit of `in_milli`, in millionths where it is small: `0.53 mg`, `49 µg`."""
+    if unit_name.startswith(("mV", "mg", "mm/s")) and 0 < abs(value) < LEAST_MILLI:
+        value, unit_name = 1e3 * value, f"µ{unit_name[1:]}"
+    return f"{rounded(value, digits)} {unit_name}"
 
 
 def as_written(value: str | float) -> str:

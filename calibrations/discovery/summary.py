@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calibrations.criteria import SIGNIFICANT
+from calibrations.discovery.findings import Candidate
 from calibrations.discovery.results import Discovery
 from calibrations.discovery.search import first_order_cost
 from calibrations.discovery.significance import chance
@@ -116,6 +118,11 @@ def _further_lines(discovery: Discovery[Fit], listed: Collection[str]) -> Iterat
 def in_milli_rows(values: Array, fit: Fit) -> Array:
     """Residuals (channels, n) in thousandths of the sensed unit."""
     return np.asarray(in_milli(values.T, fit).T)
+
+
+def certainty_of(c: Candidate) -> str:
+    """The certainty that an effect is missing: 1 minus its p-value; a candidate that is not significant has none."""
+    return certainty_text(1 - c.p_value) if c.p_value < SIGNIFICANT else "not significant"
 
 
 def certainty_text(certainty: float) -> str:

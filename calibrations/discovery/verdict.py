@@ -15,7 +15,7 @@ with the effects that the search added.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from enum import Enum, StrEnum
 from typing import Any
 
@@ -138,6 +138,8 @@ class Judgement(Evidence):
         base, *terms = self.model.split("+")
         is_grown = len(terms) > MOST_NAMED
         model = f"{base} with {len(terms)} added effects" if is_grown else self.model
+        if self.verdict is Verdict.INCOMPLETE:
+            return headline(replace(self, model=model))
         if self.verdict not in (Verdict.EFFECT_MISSING, Verdict.AMBIGUOUS):
             return self.text
         if len(self.missing) > MOST_NAMED:

@@ -15,7 +15,7 @@ from calibrations.geometry.orientation import other_in_plane, out_of_plane
 from calibrations.means.noise import rms
 from calibrations.model.chain import backward, force
 from calibrations.table import AXES, MILLI, Array, Table, in_time, time_origin
-from calibrations.text import minus, rounded
+from calibrations.text import milli_amount, rounded
 
 RESOLUTION_C = 0.01  # a smaller range of temperatures is that of a constant one
 MANY_VISITS = 10  # of one pose: the change over time is the question, and not the angle
@@ -246,9 +246,10 @@ class ChannelResidual:
                 values = self.fit.table.column(name)[rows]
                 text += f", {NAMES[name][0]} {values.min():g} to {values.max():g}°"
         times = rounded(float(rms(residual)) / self.floor, 2)
-        return (
-            f"{text}: residual {minus(f'{residual.mean():+.3g}')} {self.unit} on average, rms {times} × the noise floor"
-        )
+        return f"{text}: residual {self._signed(float(residual.mean()))} on average, rms {times} × the noise floor"
+
+    def _signed(self, value: float) -> str:
+        return f"{'+' if value > 0 else ''}{milli_amount(value, self.unit)}"
 
     def place(self, row: int) -> str:
         """The pose of a row, and its time."""
@@ -257,7 +258,7 @@ class ChannelResidual:
     def _text(self, row: int) -> str:
         residual = self.factor * float(self.fit.residual[self.c, row])
         times = rounded(abs(residual) / self.floor, 2)
-        error = f"residual {minus(f'{residual:+.3g}')} {self.unit}, {times} × the noise floor"
+        error = f"residual {self._signed(residual)}, {times} × the noise floor"
         return f"{self.place(row)}<br>{error}"
 
 

@@ -31,6 +31,8 @@ from calibrations.presentation.certificate.content import (
     Sample,
 )
 from calibrations.presentation.certificate.results import figures, require_reference
+from calibrations.presentation.charts.discovery import brief
+from calibrations.progress import report
 from calibrations.table import Table
 from calibrations.text import as_written
 from rig.bench import Bench
@@ -142,6 +144,7 @@ def _results(subject: CertificateInput, limits: Mapping[str, float | tuple[float
     if subject.before is not None:
         earlier, name = read_model(subject.before, subject.effects), Path(subject.before).name
     fresh = bool(earlier.params) and earlier.provenance.get("data_sha256") != subject.table.digest
+    report(f"Fitting {brief(subject.model.name)}")
     fitted = fit(subject.model, subject.table)
     figured = figures(fitted, earlier if fresh else None, limits)
     created = str(earlier.provenance.get("created", "of unknown date"))[:10]

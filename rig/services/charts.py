@@ -153,14 +153,15 @@ def course_chart(course: Course, name: str, time: RunTime = RunTime(), units: Ma
     t_s = [at_s - time.zero_s for at_s in run_s]
     size, unit_s = in_time(t_s[-1] - t_s[0] if t_s else 0.0)
     times, colour = np.array(t_s) / size, CANDIDATE if name == "temperature" else MEASURED
-    band = (
-        (Band(times, np.array(low), np.array(high), colour=colour, opacity=0.2),) if course.dwells_per_part > 1 else ()
-    )
+    quantity_unit = "°C" if name == "temperature" else units.get(name.removeprefix("rms "), "V")
+    reach = max(high, default=0.0) if name.startswith("rms ") else 1.0  # a mean stays in its unit, also near zero
+    factor, spelt = add_prefix(quantity_unit, reach)
+    values, lowest, highest = (factor * np.array(ends) for ends in (mean, low, high))
+    band = (Band(times, lowest, highest, colour=colour, opacity=0.2),) if course.dwells_per_part > 1 else ()
     hover = f"%{{y:.6g}} at %{{x:.4g}} {unit_s}<br>%{{text}}"
     clock = [time.clock(at_s) for at_s in run_s]
-    line = Line(times, np.array(mean), colour=colour, hover=hover, markers=len(times) < FEW, texts=clock)
-    quantity_unit = "°C" if name == "temperature" else units.get(name.removeprefix("rms "), "V")
-    return single_chart(Panel((*band, line), Axis(f"time{time.since} ({unit_s})"), Axis(f"{name} ({quantity_unit})")))
+    line = Line(times, values, colour=colour, hover=hover, markers=len(times) < FEW, texts=clock)
+    return single_chart(Panel((*band, line), Axis(f"time{time.since} ({unit_s})"), Axis(f"{name} ({spelt})")))
 
 
 # A sensor's life

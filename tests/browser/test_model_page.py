@@ -53,7 +53,7 @@ def test_a_hidden_effect_is_found_added_saved_and_undone(workbench: Workbench, t
     for text in (
         "a ← R(θ)",
         "opposite signs",
-        "above 99.9 %",
+        "> 99.99 %",
         "Cannot be separated from",
         "× the noise floor",
     ):

@@ -57,6 +57,9 @@ def test_parameters_show_what_an_effect_changes_and_make_documents(workbench: Wo
     assert model.effects == ("bias", "scale-factor", "axis-misalignment")
     page.get_by_role("button", name="Certificate").click()
     page.get_by_label("Customer").fill("Blue Buoys")
+    page.get_by_role("button", name="Make and download").click()
+    page.get_by_role("dialog").get_by_role("button", name="Cancel").click()
+    expect(page.get_by_text("Cancelled. Nothing was downloaded.")).to_be_visible()
     certificate = made(page, ".html").read_text()
     assert "Blue Buoys" in certificate
     assert (

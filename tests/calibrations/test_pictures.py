@@ -249,6 +249,13 @@ def test_the_line_of_the_model_is_broken_where_poses_are_excluded() -> None:
         assert np.count_nonzero(np.isnan(line.x)) == stretches + breaks
 
 
+def test_texts_of_many_bars_are_short() -> None:
+    steps = [Level(f"+ {k}", 10.0 - k, 11.0 - k, "3.8 mg") for k in range(9)]
+    for count, text in ((8, "10.0 × (3.8 mg)"), (9, "10.0 ×")):
+        (bars,) = [bars for bars in panels(waterfall(steps[:count]))[0].series if isinstance(bars, Bars)]
+        assert bars.texts[0] == text
+
+
 def test_texts_of_bars_keep_their_size() -> None:
     (trace,) = [trace for trace in figure(waterfall(levels(warm())), "k")["data"] if trace["type"] == "bar"]
     assert trace["constraintext"] == "none"

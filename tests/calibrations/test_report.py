@@ -30,6 +30,7 @@ from calibrations.text import (
     expand_uncertainty,
     interval,
     join_words,
+    milli_amount,
     minus,
     probability,
     rounded,
@@ -146,10 +147,10 @@ def test_it_holds_the_errors_before_and_after() -> None:
     for value in (found.start.pooled_excess, found.end.pooled_excess, step.held_out_before, step.held_out_after):
         assert f" {rounded(value)} " in text
     for fit in (found.start, found.end):
-        assert f"{rounded(pool_in_milli(fit)[0], 2)} mg" in text
+        assert milli_amount(pool_in_milli(fit)[0], "mg", 2) in text
         for c in range(2):
-            assert f"{rounded(1e3 * fit.rmse[c])} mV" in text
-            assert f"{rounded(1e3 * fit.noise.floor[c])} mV" in text
+            assert milli_amount(1e3 * fit.rmse[c], "mV") in text
+            assert f"{rounded(1e6 * fit.noise.floor[c])} µV = " in text
 
 
 def test_it_holds_every_place_where_the_model_fails() -> None:
@@ -217,9 +218,9 @@ def test_a_report_states_the_noise() -> None:
     text = Page(page()).text
     noise = warm().end.noise
     for c in range(2):
-        assert f"{rounded(1e3 * noise.floor[c])} mV" in text
+        assert f"{rounded(1e6 * noise.floor[c])} µV = " in text
         if noise.scatter[c] > 1e-3 * noise.floor[c]:
-            assert f"{rounded(1e3 * noise.scatter[c])} mV" in text
+            assert milli_amount(1e3 * noise.scatter[c], "mV") in text
     assert "from the residual of the final model" in text
 
 
@@ -257,7 +258,7 @@ def test_positions_are_told_as_positions() -> None:
 def test_nothing_missing_is_said_so() -> None:
     assert nothing().outcome == "adequate"
     assert nothing().judgement.headline == "No effect is missing."
-    assert "On 250 poses its rms error is 0.05" in summary(nothing())
+    assert "On 250 poses its rms error is 51 µg, 1.01 × the noise floor of 50 µg." in summary(nothing())
 
 
 def test_doubt_is_said_so_with_the_experiment_that_ends_it() -> None:
@@ -368,3 +369,10 @@ def test_probabilities_and_units_are_formatted() -> None:
 )
 def test_an_interval_has_a_hundredth_of_its_length(low: float, high: float, shown: str) -> None:
     assert interval(low, high) == shown
+
+
+def test_an_error_below_a_tenth_of_a_milli_unit_is_written_in_micro_units() -> None:
+    assert milli_amount(0.0497, "mV") == "49.7 µV"
+    assert milli_amount(-0.026, "mg", 2) == "−26 µg"
+    assert milli_amount(0.53, "mg", 2) == "0.53 mg"
+    assert milli_amount(0.04, "‰ of the field") == "0.0400 ‰ of the field"

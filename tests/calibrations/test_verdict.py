@@ -67,6 +67,11 @@ def test_many_effects_are_counted_in_the_short_sentence_and_named_in_the_rest() 
         "Added: 7 effects, and 2 for their exact form. Remaining error: 1.3 times the noise floor."
     )
     assert "The model has 7 effects, and 2 for their exact form: x and y." in with_forms.text  # report and terminal
+    compared = Judgement(model=grown, error=11.3, left="an error at beta 90 deg", searched=False)
+    assert compared.verdict is Verdict.INCOMPLETE
+    assert compared.summary == (
+        'The model "linear with 7 added effects" is incomplete: its error is 11.3 times the noise floor.'
+    )
     few = Judgement(model=grown, missing=("h",), added=many)
     assert few.summary == 'The model "linear with 7 added effects" misses h.'
     formed = Judgement(model=grown, missing=many, refinements=("a", "b"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -41,6 +42,17 @@ def test_what_was_measured_has_names() -> None:
 @pytest.mark.parametrize(("path", "kind"), [("hold 17", "hold"), ("A+ to B-", ""), ("", ""), ("17", "")])
 def test_dwells_of_numbered_paths_belong_together(path: str, kind: str) -> None:
     assert kind_of(dwell(1, path)) == kind
+
+
+def test_the_scatter_of_a_dwell_has_a_prefix_and_its_mean_has_none() -> None:
+    course = Course()
+    course.add(replace(dwell(1), means={"vx": 2e-5}, stds={"vx": 2.6e-5}))
+    for name, label, value in (("rms vx", "rms vx (µV)", 26.0), ("vx", "vx (V)", 2e-5)):
+        panel = course_chart(course, name).panels[0][0]
+        (line,) = panel.series
+        assert panel.y.label == label
+        assert isinstance(line, Line)
+        assert line.y == pytest.approx([value])
 
 
 def test_times_are_those_since_the_start_with_the_time_of_day_under_the_pointer() -> None:

@@ -31,10 +31,11 @@ from calibrations.presentation.charts.fit import drawn_channels, fit_album, resi
 from calibrations.presentation.charts.motion import evaluation
 from calibrations.presentation.charts.places import Falling, place_pictures
 from calibrations.presentation.residual import ChannelResidual, choices, first_choices
-from calibrations.text import rounded
+from calibrations.text import milli_amount, rounded
 
 BELOW = 0.5  # times the floor: where the logarithmic axis begins
 FEWEST = 4  # bars that there is room for: one alone is no thicker than they
+MANY_BARS = 8  # more bars have short texts, which fit beside them
 NEAR = 1.15  # times the floor: as good as noise
 LONG = 0.5  # of the axis: a bar that its text fits into
 ROW = 0.42  # inches
@@ -84,7 +85,7 @@ def brief(model: str) -> str:
 
 def error_text(fit: Fit) -> str:
     """The rms error with its unit."""
-    return f"{rounded(pool_in_milli(fit)[0], 2)} {milli_unit(fit)}"
+    return milli_amount(pool_in_milli(fit)[0], milli_unit(fit), 2)
 
 
 def waterfall(steps: Sequence[Level], words: Measure = Measure()) -> Chart:
@@ -95,7 +96,8 @@ def waterfall(steps: Sequence[Level], words: Measure = Measure()) -> Chart:
     excess, unseen = (np.array([getattr(level, name) for level in steps], float) for name in ("seen", "unseen"))
     reach = 2.2 * max(*excess, *unseen, 3.0)
     colours = [MODEL, *(GOOD if value < NEAR else MEASURED for value in excess[1:])]
-    texts = [f"{rounded(level.seen)} × ({level.rms})" for level in steps]
+    units = [f" ({level.rms})" if len(steps) <= MANY_BARS else "" for level in steps]
+    texts = [f"{rounded(level.seen)} ×{in_unit}" for level, in_unit in zip(steps, units, strict=True)]
     text_inside = [log10(max(value, BELOW) / BELOW) > LONG * log10(reach / BELOW) for value in excess]
     hover = [f"{rounded(value)} × {words.over} on {words.unseen}" for value in unseen]
     series = (

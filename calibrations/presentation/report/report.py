@@ -29,7 +29,16 @@ from calibrations.presentation.page import html
 from calibrations.presentation.report.motion import motion_page
 from calibrations.presentation.report.parameters import estimate_cells, matrices_section, name_of_file, verdicts
 from calibrations.table import Array
-from calibrations.text import capital, estimate_text, join_words, keep_units_together, minus, probability, rounded
+from calibrations.text import (
+    capital,
+    estimate_text,
+    join_words,
+    keep_units_together,
+    milli_amount,
+    minus,
+    probability,
+    rounded,
+)
 
 LONG_MIN = 120  # longer durations are given in hours
 
@@ -46,12 +55,12 @@ def _error(discovery: Discovery[Fit]) -> str:
     rows, pattern = f"{start.table.n} {start.table.type.rows}", f" Remaining: {structure}." if structure else ""
     if not discovery.steps:
         return (
-            f"On {rows} its rms error is {rounded(error, 2)} {unit}, {rounded(start.pooled_excess)} × the noise floor "
-            f"of {rounded(floor, 2)} {unit}.{pattern}"
+            f"On {rows} its rms error is {milli_amount(error, unit, 2)}, {rounded(start.pooled_excess)} × the noise "
+            f"floor of {milli_amount(floor, unit, 2)}.{pattern}"
         )
     text = (
-        f"On {rows} the rms error falls from {rounded(error, 2)} {unit} to {rounded(pool_in_milli(end)[0], 2)} {unit}; "
-        f"the noise floor is {rounded(floor, 2)} {unit}. The held-out error falls from "
+        f"On {rows} the rms error falls from {milli_amount(error, unit, 2)} to {error_text(end)}; "
+        f"the noise floor is {milli_amount(floor, unit, 2)}. The held-out error falls from "
         f"{rounded(start.held_out_excess)} to {rounded(discovery.steps[-1].held_out_after)} × the noise floor."
     )
     if refinements := discovery.judgement.refinements:
@@ -63,18 +72,18 @@ def key_figures(discovery: Discovery[Fit]) -> list[tuple[str, str, str]]:
     """The few numbers to remember: (what, value, remark)."""
     start, floor, unit = discovery.start, pool_in_milli(discovery.start)[1], milli_unit(discovery.start)
     first = "error before" if discovery.steps else "rms error"
-    figures = [(first, f"{rounded(pool_in_milli(start)[0], 2)} {unit}", _error_text(start, start.held_out_excess))]
+    figures = [(first, error_text(start), _error_text(start, start.held_out_excess))]
     if discovery.steps:
         held_out = discovery.steps[-1].held_out_after
         figures.append(
             (
                 "error after",
-                f"{rounded(pool_in_milli(discovery.end)[0], 2)} {unit}",
+                error_text(discovery.end),
                 _error_text(discovery.end, held_out),
             )
         )
     kind = "white noise of one mean" if start.noise.known else "from the scatter: the white noise is not known"
-    return [*figures, ("noise floor", f"{rounded(floor, 2)} {unit}", kind)]
+    return [*figures, ("noise floor", milli_amount(floor, unit, 2), kind)]
 
 
 def _error_text(fit: Fit, held_out: float) -> str:
@@ -258,8 +267,8 @@ def _amount(values: Array, c: int, fit: Fit) -> str:
     """An error of channel `c` in mg and, of poses, in the output's unit too."""
     if not values[c] > SHOWS * fit.noise.floor[c]:
         return "none found"
-    volts = f"{rounded(1e3 * values[c])} m{fit.table.unit} = " if fit.table.type.stage_angles else ""
-    return f"{volts}{rounded(in_milli(values, fit)[c])} {milli_unit(fit)}"
+    volts = f"{milli_amount(1e3 * values[c], f'm{fit.table.unit}')} = " if fit.table.type.stage_angles else ""
+    return f"{volts}{milli_amount(in_milli(values, fit)[c], milli_unit(fit))}"
 
 
 def _time_constant(taus_s: tuple[float, ...]) -> str:

@@ -15,7 +15,7 @@ from calibrations.discovery.summary import step_shares
 from calibrations.discovery.verdict import Verdict
 from calibrations.fitting.fit import Fit, milli_unit, pool_in_milli
 from calibrations.presentation.views.view import View, candidate_cells
-from calibrations.text import Cells, quantity, rounded
+from calibrations.text import Cells, milli_amount, quantity, rounded
 
 if TYPE_CHECKING:
     from calibrations.presentation.chart import Chart, Picture
@@ -33,9 +33,9 @@ class RowsView(View[Fit]):
         """Error, held-out error and noise floor."""
         (error, floor), unit = pool_in_milli(fit), milli_unit(fit)
         return {
-            "error": f"{rounded(fit.pooled_excess)} × ({rounded(error, 2)} {unit})",
+            "error": f"{rounded(fit.pooled_excess)} × ({milli_amount(error, unit, 2)})",
             f"on {self.data.unseen}": f"{rounded(fit.held_out_excess)} ×",
-            "noise floor": f"{rounded(floor, 2)} {unit}",
+            "noise floor": milli_amount(floor, unit, 2),
         }
 
     def facts(self, candidate: Candidate, diagnosis: Diagnosis[Fit]) -> dict[str, str]:

@@ -53,6 +53,8 @@ class Choice:
             self._noise()
             self.parameters = button("Parameters", "tune", page.see_parameters)
             self.undo = button("Undo", "undo", page.undo)
+            with self.undo:
+                self.undo_tip = ui.tooltip("Undo")  # a name in the button would take the place of the others
             self.save = button("Save model", "save", self._ask_name)
             self.report = button("Report", "description", self._report)
         for choice in (self.parameters, self.undo, self.save, self.report):
@@ -85,7 +87,9 @@ class Choice:
     def grown(self, session: ModelSession[Any]) -> None:
         """Enable Undo if the session has steps."""
         self.undo.set_enabled(bool(session.steps))
-        self.undo.set_text(f"Undo {session.steps[-1].name}" if session.steps else "Undo")
+        last = f"Undo {session.steps[-1].name}" if session.steps else "Undo"
+        self.undo.props(f'aria-label="{last}"')
+        self.undo_tip.set_text(last)
 
     def _ask_file(self) -> None:
         with dialog_with_name("Open a file") as dialog, ui.card():

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import io
 import zipfile
+from functools import partial
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
 from calibrations.compensation.inverse import Range, invert_model
 from calibrations.model.file import dump_model
+from calibrations.progress import report
 from rig.bench import read_bench
 from rig.errors import RigError
-from rig.web.calculations import off_loop
+from rig.services.search import Cancelled
+from rig.web.calculations import Visit
 from rig.web.desk import models
-from rig.web.parts import dialog_with_name, div, for_page, message, words
+from rig.web.parts import PROGRESS_S, afresh, dialog_with_name, div, for_page, message, waiting, words
 
 if TYPE_CHECKING:
     from calibrations.model import Model
@@ -31,33 +35,54 @@ class DocumentDialog:
             words(explanation, "quiet small")
             self.fields = div("settings").style("width: 100%")
             self.below = div("stack")
-            self.answer = div("stack")
+            self.answer = div("stack").props("role=status")
+            self.visit = Visit()
             with div("row-of"):
                 self.make = ui.button("Make and download", icon="download", on_click=self._make)
-                ui.button("Close", on_click=self.dialog.close).props("flat")
+                self.end = ui.button("Cancel", icon="close", on_click=self.visit.cancel).props("flat")
+                self.end.set_visibility(False)
+                ui.button("Close", on_click=self._close).props("flat")
+
+    def _close(self) -> None:
+        self.visit.cancel()
+        self.dialog.close()
 
     async def _make(self) -> None:
         """Make the document off the event loop; the reason stays in the dialog if that fails."""
-        self.make.props("loading")
         self.make.disable()
-        self.answer.clear()
+        self.end.set_visibility(True)
+        begun_s, self.visit.doing = monotonic(), "Making the document"
+        with afresh(self.answer):
+            progress = waiting(f"{self.visit.doing} ...")
+            tick = partial(_show_progress, progress, self.visit, begun_s)
+            ui.timer(PROGRESS_S, tick)
         try:
-            content, name, lines = await off_loop(self.made)
+            content, name, lines = await self.visit.work(self.made)
             ui.download.content(content, name)
-            with self.answer:
+            with afresh(self.answer):
                 words(f"Downloaded: {name}", "chip good")
                 for line in lines:
                     words(for_page(line), "small")
+        except Cancelled:
+            if not self.visit.closed:
+                with afresh(self.answer):
+                    words("Cancelled. Nothing was downloaded.", "quiet")
         except Exception as error:
+            self.answer.clear()
             with self.answer, div("").props("role=alert"):
                 words(message(error), "fault")
         finally:
-            self.make.props(remove="loading")
+            self.end.set_visibility(False)
             self.make.enable()
 
     def made(self) -> tuple[bytes | str, str, list[str]]:
         """Content, file name, and remarks."""
         raise NotImplementedError
+
+
+def _show_progress(label: ui.label, visit: Visit, begun_s: float) -> None:
+    """What the work does now, and since when."""
+    label.set_text(f"{visit.doing}, {monotonic() - begun_s:.0f} s")
 
 
 class CertificateDialog(DocumentDialog):
@@ -102,6 +127,7 @@ class CertificateDialog(DocumentDialog):
         )
         document = certified(subject, str(self.number.value or "").strip(), str(self.customer.value or "").strip())
         failed = failed_results(document)
+        report("Writing the certificate")
         lines = [certificate_head(document), *document.figures.remarks, *document.remarks]
         lines += [f"Beyond its limit: {name}" for name in failed]
         return format_certificate(document, form), f"{document.number}{form}", lines

@@ -7,8 +7,10 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
+from nicegui.element import Element
+from nicegui.events import ValueChangeEventArguments
 
-from calibrations.criteria import SIGNIFICANT
+from calibrations.discovery.summary import certainty_of
 from calibrations.discovery.verdict import Verdict
 from calibrations.presentation.formula import formula_html
 from calibrations.presentation.views import view_of
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
 
 
 FIRST = 6  # cards without unfolding the rest
+MOST_CHIPS = 4  # added effects without folding them
 OWN_NAME = "my-effect"
 
 
@@ -49,6 +52,7 @@ class Missing:
         self.page = page
         self.looked_at: Candidate | None = None
         self.tried: dict[str, Step[Any]] = {}
+        self.unfolded = False  # the added effects, where they are many
         with div("side"):
             words("Missing effects", "title")
             self.added = div("row-of added")
@@ -87,12 +91,22 @@ class Missing:
         self.added.clear()
         if not session.steps:
             return
-        with self.added:
-            words("Added:", "quiet small")
+        with self.added, self._place_of_chips(len(session.names)):
             for name in session.names:
                 removal = ui.button(name, on_click=partial(self.page.remove, name))
                 with removal.props(f'outline dense no-caps icon-right=close aria-label="Remove {name}"'):
                     ui.tooltip(f"Remove {name}; the others are fitted again")
+
+    def _place_of_chips(self, count: int) -> Element:
+        """A line for a few chips; many are folded, so that the candidates stay in view."""
+        if count <= MOST_CHIPS:
+            words("Added:", "quiet small")
+            return div("row-of")
+        title = f"Added: {count} effects"
+        return ui.expansion(title, value=self.unfolded, on_value_change=self._keep_fold).props("dense").classes("grow")
+
+    def _keep_fold(self, event: ValueChangeEventArguments[bool]) -> None:
+        self.unfolded = bool(event.value)
 
     def discovering(self, name: str, at: int, total: int) -> None:
         """Show the present step of the discovery, with a button that ends it after this step."""
@@ -236,14 +250,15 @@ class Card:
             ui.button("Show the curve", on_click=lambda: side.look_at(c, look=True)).props("dense flat")
         ui.html(formula_html(c.effect.formula, side.unit), sanitize=False).classes("formula")  # it escapes
         with div("chance"):
-            div("").style(f"width: {100 * c.probability:.1f}%")
+            div("").style(f"width: {100 * (1 - c.p_value):.1f}%")
         rivals = ", ".join(c.indistinguishable_from)
         facts(
             {
                 "Symptom": capital(c.effect.symptom),
                 **view_of(result.findings.data).facts(c, result),
-                "Probability as the only effect" if len(result.missing) > 1 else "Probability": chances(c),
+                "Certainty": certainty_of(c),
                 "Cannot be separated from": rivals or "nothing in the catalogue",
+                "p-value": f"{probability(c.p_value)}, the chance of so large an improvement if no effect is missing",
                 "Source": c.effect.source or "–",
             }
         )
@@ -263,20 +278,6 @@ class Card:
             self.head.props("aria-expanded=false")
         else:
             self.open()
-
-
-def chances(c: Candidate) -> str:
-    """The probability of a candidate, and the p-value of its gain."""
-    remark = "" if c.p_value < SIGNIFICANT else ", not significant"
-    return f"{share(c.probability)}; p = {probability(c.p_value)}{remark}"
-
-
-def share(probability: float) -> str:
-    """An approximate probability in words: never 0 or 100 %."""
-    for limit, text in ((0.999, "above 99.9 %"), (0.99, "above 99 %")):
-        if probability > limit:
-            return text
-    return "below 0.1 %" if probability < 1e-3 else f"{100 * probability:.2g} %"
 
 
 # An effect of your own: an expression, tested as you type, with its errors.

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from calibrations.fitting.fit import Fit
     from rig.services.session import ModelSession
 
+BAR_PX, AXIS_PX = 19, 60  # a bar with its text, and the axis below the bars
 LONG = 4  # letters in a channel name
 LINKED_PICTURES = ("measurement", "residual", "failure")
 TITLES = {
@@ -184,7 +185,10 @@ class Pictures(AxisAndUnit):
                 picture["data"][_dots(picture)]["selectedpoints"] = self.selected
             remember(self.plots[name], single_chart(panel))
             redraw(self.plots[name], picture)
-        draw(self.plots["waterfall"], waterfall(levels(session)), "waterfall", False)
+        steps = levels(session)
+        for name in ("failure", "waterfall"):  # a row of the grid
+            self.plots[name].style(f"min-height: {BAR_PX * len(steps) + AXIS_PX}px")
+        draw(self.plots["waterfall"], waterfall(steps), "waterfall", False)
         self._show_hint(channel)
 
     def _legends(self, channel: ChannelResidual, abscissa: Column) -> None:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from nicegui import ui
 
 from calibrations.discovery.verdict import Verdict
+from calibrations.presentation.charts.discovery import brief
 from calibrations.presentation.views import view_of
 from rig.web.parts import PROGRESS_S, afresh, box, div, for_page, words
 
@@ -87,7 +88,7 @@ class VerdictBox:
         self.search = search
         self.progress.set_visibility(True)
         if judgement is not None:
-            self.headline.set_text(for_page(judgement.headline))
+            self.headline.set_text(for_page(judgement.summary))
             self.box.classes(add=LOOKS[judgement.verdict])
             self.provisional.set_visibility(True)
             self.progress.set_text(f"{SEARCHING} ...")
@@ -137,6 +138,6 @@ class VerdictBox:
 
 def _show_failing(compared: Comparison[Any]) -> str:
     """The model and the data; the places where it fails have a row of their own."""
-    subject = f"{compared.fit.model.name} on {compared.data.description}."
+    subject = f"{brief(compared.fit.model.name)} on {compared.data.description}."
     text = subject if compared.fails else f"{subject} No place fails."
     return " ".join(filter(None, (text, compared.data.note)))
