@@ -29,7 +29,7 @@ SOFT_IRON_PAIRS = ("xx", "yy", "xy", "xz", "yz")
 FIELD = "Magnitude of the field."
 MAGNITUDE_ERROR = "Error of the magnitude that remains, in thousandths of the field."
 STEADY_STATE = {
-    "steady-state": "Steady: the drift stays within the tolerance.",
+    "steady-state": "Steady state: the drift stays within the tolerance.",
     "steady-state-time": "Time after power-on from which the drift is within the tolerance.",
     "steady-state-earliest": "Forecast: not earlier than this (97.5 %).",
     "steady-state-expected": "Forecast: the most likely time.",
@@ -145,14 +145,14 @@ RESULTS: Mapping[str, Mapping[str, str]] = {  # name -> meaning, by procedure
             {
                 "bias-drift-{axis}": "Change of the bias over the soak.",
                 "scale-drift-{axis}": "Relative change of the scale factor over the soak.",
-                "bias-tolerance-{axis}": "A smaller change counts as steady.",
-                "scale-tolerance-{axis}": "A smaller change counts as steady.",
+                "bias-tolerance-{axis}": "A smaller change of the bias counts as steady.",
+                "scale-tolerance-{axis}": "A smaller relative change of the scale factor counts as steady.",
                 "time-constant-{axis}": "Slowest time constant of the bias in warm-up.",
                 "scale-time-constant-{axis}": "Slowest time constant of the scale factor in warm-up.",
                 "bias-final-{axis}": "Bias after warm-up, as extrapolated.",
                 "scale-final-{axis}": "Scale factor after warm-up, as extrapolated.",
-                "bias-foreseen-{axis}": "From this time after power-on the forecast was right.",
-                "scale-foreseen-{axis}": "From this time after power-on the forecast was right.",
+                "bias-foreseen-{axis}": "Time after power-on from which the forecast of the bias was right.",
+                "scale-foreseen-{axis}": "Time after power-on from which the forecast of the scale factor was right.",
             }
         ),
         "temperature-wander": "Range of the temperature after warm-up.",
@@ -173,6 +173,20 @@ RESULTS: Mapping[str, Mapping[str, str]] = {  # name -> meaning, by procedure
 def meaning(procedure: str, name: str) -> str:
     """One sentence on a result, whose sensor may precede its name; "" if a procedure of a user names it."""
     return RESULTS.get(procedure, {}).get(name.rpartition("/")[2], "")
+
+
+def label(procedure: str, name: str) -> str:
+    """A result in words: its meaning, the axis, and the sensor of a batch; its name if a procedure of a user names it.
+
+    `bias-drift-x` of a soak is `Change of the bias over the soak, axis x`.
+    """
+    sensor, _, short = name.rpartition("/")
+    text = meaning(procedure, name).removesuffix(".")
+    if not text:
+        return name
+    axis = short[-1] if short[-2:-1] == "-" and short[-1] in AXES else ""
+    of_axis = f", axis {axis}" if axis and f"axis {axis}" not in text else ""
+    return f"{f'{sensor}: ' if sensor else ''}{text}{of_axis}"
 
 
 def names_with_limits() -> list[str]:

@@ -142,6 +142,7 @@ def results_table(results: Mapping[str, Any]) -> list[str]:
 
 STEADY = re.compile(r"(?P<sensor>.*/)?steady-state(?P<axis>-\w)?")
 FORECAST = ("earliest", "expected", "latest")
+NOT_CONFIRMED = "Not confirmed in this run."  # also where the forecast is the end of the run
 
 
 @dataclass(frozen=True)
@@ -204,10 +205,10 @@ def _steady_sentence(reached: bool, parts: Mapping[str, Any]) -> str:
         return f"Reached {time_text(time['value'], time['std'])} {time['unit']} after power-on."
     if "expected" in times:
         interval = f", {times['earliest']} to {times['latest']} (95 %)" if times["earliest"] != times["latest"] else ""
-        return f"Not reached. Forecast: {times['expected']} after power-on{interval}."
+        return f"{NOT_CONFIRMED} Forecast: steady {times['expected']} after power-on{interval}."
     if "earliest" in times:
-        return f"Not reached. Forecast: not before {times['earliest']} after power-on."
-    return "Not reached. There is no forecast."
+        return f"{NOT_CONFIRMED} Forecast: not steady before {times['earliest']} after power-on."
+    return f"{NOT_CONFIRMED} There is no forecast."
 
 
 def _value_in_terminal(name: str, result: Mapping[str, Any]) -> str:

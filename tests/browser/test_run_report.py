@@ -45,7 +45,7 @@ def test_the_night_of_a_soak_is_told_and_drawn(workbench: Workbench) -> None:
     workbench.shot(page, "run-report")
     workbench.fits(page)
     row = page.get_by_role("row").filter(has_text="steady-state")
-    expect(row.first).to_contain_text(re.compile("Not reached. |Reached "))
+    expect(row.first).to_contain_text(re.compile("Not confirmed in this run. |Reached "))
     assert _brightness(page) > 0.8
     for _ in ("light", "dark"):
         page.get_by_label("Light or dark").click()

@@ -97,7 +97,7 @@ def test_the_steady_state_is_a_sentence_with_times_of_three_digits() -> None:
     not_reached = {"steady-state": {**time, "value": 0.0, "unit": ""}}
     forecast = {f"steady-state-{end}": {**time, "value": 2.35022} for end in ("earliest", "expected", "latest")}
     assert results_table(not_reached | forecast)[1:] == [
-        "steady-state  Not reached. Forecast: 2.35 h after power-on.  -",
+        "steady-state  Not confirmed in this run. Forecast: steady 2.35 h after power-on.  -",
     ]
     wider = forecast | {"steady-state-latest": {**time, "value": 3.1}}
     assert "2.35 h to 3.10 h (95 %)" in results_table(not_reached | wider)[1]

@@ -57,10 +57,12 @@ def test_the_steady_state_is_one_sentence() -> None:
     not_yet |= {f"A/steady-state-{end}-x": result for end, result in forecast.items()}
     rows = result_rows(not_yet)
     assert [row.name for row in rows] == ["A/steady-state-x", "A/steady-state-latest-x"]  # a limit has its own row
-    assert rows[0].value == "Not reached. Forecast: 3.00 h after power-on, 2.00 h to 5.00 h (95 %)."
+    assert (
+        rows[0].value == "Not confirmed in this run. Forecast: steady 3.00 h after power-on, 2.00 h to 5.00 h (95 %)."
+    )
     assert (rows[0].limit, rows[0].verdict) == ("must be reached", "fail")
     reached = {"steady-state": _result(1.0), "steady-state-time": _result(3.25, std=0.11), "gap": _result(0.0)}
     assert [row.value for row in result_rows(reached)] == ["Reached 3.25(11) h after power-on.", "none"]
     early = {"steady-state": _result(1.0), "steady-state-time": _result(0.02, std=3.85)}
     assert result_rows(early)[0].value == "Reached at most 7.7 h after power-on."
-    assert result_rows({"steady-state": _result(0.0)})[0].value == "Not reached. There is no forecast."
+    assert result_rows({"steady-state": _result(0.0)})[0].value == "Not confirmed in this run. There is no forecast."

@@ -10,7 +10,7 @@ import yaml
 from calibrations.errors import DataError
 from procedures.errors import ProcedureError
 from rig.bench import DEFAULT
-from rig.bench.result_names import RESULTS, meaning, names_with_limits
+from rig.bench.result_names import RESULTS, label, meaning, names_with_limits
 from rig.record import Record
 from rig.record.measured import table_of
 from rig.results import Result, documents, read_returned
@@ -147,6 +147,13 @@ def test_each_result_of_a_procedure_has_a_meaning(procedure: str) -> None:
     for name in RESULTS[procedure]:
         assert meaning(procedure, name).endswith("."), name
         assert meaning(procedure, f"a1/{name}") == meaning(procedure, name)
+
+
+def test_a_page_names_a_result_by_its_meaning_with_axis_and_sensor() -> None:
+    assert label("soak", "bias-drift-x") == "Change of the bias over the soak, axis x"
+    assert label("soak", "a1/gap") == "a1: Total time without samples"
+    assert label("misalignment", "alpha-y") == "Angle alpha from the reference axis to sensing axis y"
+    assert label("mine", "loudness") == "loudness"
 
 
 def test_the_meaning_of_a_result_names_its_axes() -> None:

@@ -13,7 +13,7 @@ from nicegui import ui
 from calibrations.presentation.interactive import figure
 from calibrations.text import join_words
 from procedures.settings import setting_text
-from rig.bench.result_names import meaning
+from rig.bench.result_names import label
 from rig.errors import RecordError
 from rig.record import Event, Record, Run
 from rig.record.history import history
@@ -335,14 +335,14 @@ def _results(run: Run) -> None:
     with ui.element("table").classes("plain-table results"):
         for row in result_rows(run.results):
             with ui.element("tr"):
-                for cell in (row.name, for_page(row.value), row.limit):
+                for cell in (label(run.procedure, row.name), for_page(row.value), row.limit):
                     with ui.element("td"):
                         words(cell)
                 with ui.element("td"):
                     if row.verdict:
                         words(row.verdict, f"chip {LOOKS[row.verdict]}")
                 with ui.element("td").classes("meaning quiet small"):
-                    words(meaning(run.procedure, row.name))
+                    words(row.name)  # as a limit of the bench file names it
 
 
 def _circumstances(run: Run) -> tuple[dict[str, str], ...]:
