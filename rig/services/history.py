@@ -41,6 +41,14 @@ def members(run: Run) -> dict[str, str]:
     return {as_written(name): ""} if name else {}
 
 
+def type_of(sensor: str, run: Run) -> str:
+    """The type of a sensor that its serial number identifies, such as ADXL203; "" where the run does not have it."""
+    name = (
+        run.bench["sensors"][members(run)[sensor]]["name"] if run.bench.get("sensors") else run.constants.get("sensor")
+    )
+    return as_written(name) if name and as_written(name) != sensor else ""
+
+
 def sensors(runs: Iterable[Run]) -> list[str]:
     """Every sensor of the runs."""
     return list(dict.fromkeys(sensor for run in runs for sensor in members(run)))

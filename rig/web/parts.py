@@ -238,8 +238,18 @@ def for_page(text: str) -> str:
 # Settings of a procedure as text: `step_deg = 10.0` is shown as `step (deg)`, `10`.
 
 
+COUNTS = {
+    "reference_every": "poses between two references",
+    "times": "times (tumbles of each sort)",
+    "cycles": "cycles (of temperature)",
+    "mounts": "mounts (edges upright)",
+}
+
+
 def setting_label(name: str) -> str:
-    """`step_deg` as `step (deg)`."""
+    """`step_deg` as `step (deg)`; a count with what it counts."""
+    if name in COUNTS:
+        return COUNTS[name]
     head, stated_unit = split_unit(name)
     spelt = {"um": "µm"}.get(stated_unit, unit(stated_unit))
     return f"{head.replace('_', ' ')} ({spelt})" if spelt else head.replace("_", " ")

@@ -66,7 +66,7 @@ def test_parameters_show_what_an_effect_changes_and_make_documents(workbench: Wo
         "No values as found: no earlier calibration was given." in certificate
     )  # the model's values are from these data
     page.get_by_role("button", name="Compensation").click()
-    page.get_by_label("Largest value of each axis").fill("-1")
+    page.get_by_label("Largest value of each axis (g)").fill("-1")
     page.get_by_role("button", name="Make and download").click()
     expect(page.get_by_role("dialog").get_by_role("alert")).to_contain_text("must be above 0")
     page.get_by_label("Largest value of each axis").fill("2")

@@ -142,9 +142,7 @@ def test_many_wishes_for_a_pause_are_one_pause() -> None:
             control.answer(paused, "resume")
         control.stop(when("running", lambda status: status.done > done))
 
-    assert carried_out("soak", {"duration_s": "43200"}, person).error.startswith(
-        "stopped on a page of the workbench"
-    )
+    assert carried_out("soak", {"duration_s": "43200"}, person).error.startswith("stopped on a page of the workbench")
 
 
 def test_a_wish_for_a_pause_while_the_run_connects_again_pauses_it(monkeypatch: pytest.MonkeyPatch) -> None:

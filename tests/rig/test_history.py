@@ -15,7 +15,16 @@ from calibrations.model.file import read_model
 from calibrations.table import Table
 from rig.errors import RecordError
 from rig.record import Record
-from rig.services.history import Calibration, History, Value, _most_frequent_kind, history, judge_history, latest
+from rig.services.history import (
+    Calibration,
+    History,
+    Value,
+    _most_frequent_kind,
+    history,
+    judge_history,
+    latest,
+    type_of,
+)
 from rig.services.history_comparison import compare_rigs
 from tests.rig.conftest import Rig
 from tests.rig.lives import COLUMNS, calibrated
@@ -190,3 +199,12 @@ def test_calibrations_of_another_kind_or_by_an_incomplete_model_are_not_compared
     life = judge_history(History("17", "linear", tuple(found), (), others), {})
     assert life.quantities[0].line is None
     assert "not complete for 1 of 3" in life.warnings[0]
+
+
+def test_a_sensor_has_its_type_beside_its_serial_number(years: None) -> None:
+    with Record.to_read() as record:
+        run = record.runs()[0]
+    assert type_of("17", replace(run, constants={"serial": "17", "sensor": "ADXL203"})) == "ADXL203"
+    assert type_of("ADXL203", replace(run, constants={"sensor": "ADXL203"})) == ""
+    batch = {"sensors": {"a1": {"name": "ADXL203", "serial": "17"}, "a2": {"name": "ADXL203"}}}
+    assert [type_of(sensor, replace(run, bench=batch)) for sensor in ("17", "ADXL203")] == ["ADXL203", ""]

@@ -30,6 +30,7 @@ from rig.web.calculations import Visit, begin, off_loop
 from rig.web.desk import Desk
 from rig.web.pages import register
 from rig.web.pages.run_report import draw_ahead, report_html
+from rig.web.parts import setting_label
 from rig.web.server import LeftPages
 from tests.browser.measured import hidden, two_faults
 
@@ -306,3 +307,9 @@ def test_the_first_analysis_loads_no_machine_code(tmp_path: Path) -> None:
     words = [sys.executable, "-c", FIRST_ANALYSIS, hidden(tmp_path, "package turned")]
     ended = subprocess.run(words, capture_output=True, text=True, check=True)
     assert ended.stdout == "True True True\n"
+
+
+def test_a_setting_has_its_unit_or_what_it_counts() -> None:
+    assert setting_label("step_deg") == "step (deg)"
+    assert setting_label("reference_every") == "poses between two references"
+    assert setting_label("face") == "face"

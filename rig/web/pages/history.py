@@ -22,6 +22,7 @@ from rig.services.history import (
     latest,
     limits_of,
     run_date,
+    type_of,
 )
 from rig.services.request import effects_of
 from rig.web.calculations import Visit, off_loop
@@ -42,7 +43,7 @@ from rig.web.parts import LINKED, afresh, box, button, div, show_error, shown, s
 
 # The list of sensors.
 
-COLUMNS = sortable({"sensor": "sensor", "count": "calibration runs", "first": "first", "last": "last"})
+COLUMNS = sortable({"sensor": "sensor", "type": "type", "count": "calibration runs", "first": "first", "last": "last"})
 PAGE = 25
 NONE = (
     "The history of a sensor consists of its calibrations: sweeps and other runs of poses, positions or rotations. A "
@@ -79,6 +80,7 @@ def _row(sensor: str, runs: list[Run]) -> dict[str, object]:
     return {
         "sensor": sensor,
         "to": HistoryRequest(sensor).address,
+        "type": type_of(sensor, runs[-1]) or "–",
         "count": len(runs),
         "first": days[0],
         "last": days[-1],
@@ -136,7 +138,7 @@ class HistoryPage:
             )
             self.limit = ui.number("Largest change", min=0, on_change=self._change_limit).props("dense debounce=300")
             self.baseline = ui.number(
-                "Chart baseline",
+                "Chart baseline (calibrations)",
                 value=request.baseline,
                 min=FEWEST_RUNS,
                 precision=0,

@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
+from calibrations.compensation.forward import input_unit
 from calibrations.compensation.inverse import Range, invert_model
 from calibrations.model.file import dump_model
+from calibrations.presentation.residual import column_label
 from calibrations.progress import report
+from calibrations.text import unit
 from rig.bench import read_bench
 from rig.errors import RigError
 from rig.services.search import Cancelled
@@ -149,9 +152,13 @@ class CompensationDialog(DocumentDialog):
             self.language = ui.select(languages, label="Language", value="c")
             self.name = ui.input("Name of files and functions", value=Path(session.request.data).stem)
             self.precision = ui.select({"double": "double", "float": "float"}, label="Precision", value="double")
-            self.reach = ui.number("Largest value of each axis", value=self.default.reach, min=0)
+            of_axes = f"Largest value of each axis ({unit(input_unit(self.model))})"
+            self.reach = ui.number(of_axes, value=self.default.reach, min=0)
             self.inputs = {
-                name: (ui.number(f"{name}: lowest", value=low), ui.number(f"{name}: highest", value=high))
+                name: tuple(
+                    ui.number(f"{column_label(name)}: {end}", value=value)
+                    for end, value in (("lowest", low), ("highest", high))
+                )
                 for name, (low, high) in self._inputs().items()
             }
         with self.below:

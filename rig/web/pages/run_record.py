@@ -21,7 +21,7 @@ from rig.record.tables import units_of
 from rig.services.charts import Course, RunTime, course_chart, kind_of
 from rig.services.exclusion import exclude, find_numbered_run
 from rig.services.export import export
-from rig.services.history import lives
+from rig.services.history import lives, type_of
 from rig.services.next_steps import page_steps, result_rows
 from rig.services.page_words import page_step
 from rig.services.request import Request
@@ -205,7 +205,7 @@ def _new_dwells(run: str, after_number: int) -> tuple[list[tuple[int, Any]], Run
 # The page of one run: settings, results, notes, export and report.
 
 LOOKS = {"pass": "good", "fail": "bad", "marginal": "doubt"}
-FORMATS = {"csv": ("CSV", "csv"), "event-model": ("Event model", "jsonl")}  # label, and ending of the file
+FORMATS = {"csv": ("CSV", "csv"), "event-model": ("Bluesky events", "jsonl")}  # label, and ending of the file
 SHOWN = 200  # characters of a setting
 
 
@@ -242,7 +242,8 @@ class OneRun:
                         step_row(step, "quiet small")
                     for sensor, count in run_counts.items():
                         address = HistoryRequest(sensor).address
-                        ui.link(f"{count} runs of the sensor {sensor}: history", address).classes("small")
+                        named = " ".join(filter(None, (type_of(sensor, run), sensor)))
+                        ui.link(f"{count} runs of the sensor {named}: history", address).classes("small")
                 with box("stack"):
                     words("Settings", "title")
                     for part in _circumstances(run):
