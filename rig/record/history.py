@@ -15,6 +15,7 @@ from rig.record.values import Event, Line
 STOPS = (Stopped, SafetyLimit, Interlocked, NoAnswer, Declined)  # errors that stop a run; others are failures
 TURNS = ("begun", "error", "stopped", "complete")  # kinds of lines in the log
 ENDS = ("stopped", "failed")  # events that end a part of a run
+WITHOUT_END = "; before, its process was killed or the disk was full"
 ERROR = re.compile(r"(\w+): (?:stopped )?(.*?)(?:; `rig resume [^`]*` continues the run)?", re.DOTALL)
 
 
@@ -35,8 +36,7 @@ def _turns(lines: Iterable[Line]) -> list[Event]:
     for line in lines:
         previous = turns[-1].what if turns else ""
         if line.what == "begun" and turns:
-            text = line.text if previous in ENDS else f"{line.text}; the part before it was killed"
-            turns.append(Event(line.at, "resumed", text))
+            turns.append(Event(line.at, "resumed", line.text + ("" if previous in ENDS else WITHOUT_END)))
         elif line.what == "error":
             turns.append(_stop(line))
         elif line.what == "stopped" and previous in ENDS:

@@ -221,11 +221,12 @@ def _complete(record: Record, run: str, reason: str | None, results: Mapping[str
 
 
 def _interrupted_outcome(record: Record, run: Run, error: Exception, complaints: Sequence[str]) -> Outcome:
-    """The outcome of an interrupted run, even if the record cannot be read any more."""
-    try:
-        return Outcome(record.run(run.run), error, tuple(complaints))
-    except RecordError:
-        return Outcome(replace(run, state=_state(error), message=str(error)), error, tuple(complaints))
+    """The outcome of an interrupted run, even if the record cannot be read or written any more."""
+    with suppress(RecordError):
+        run = record.run(run.run)
+    if run.state == "running":  # the record could not take the end
+        run = replace(run, state=_state(error), message=str(error))
+    return Outcome(run, error, tuple(complaints))
 
 
 def _error_of(failure: BaseException, run: Run, observer: Observer) -> Exception:

@@ -16,7 +16,7 @@ from calibrations.errors import DataError
 from calibrations.importing.foreign import read_csv, sort_out_rows
 from calibrations.importing.raw_logs import average_raw_log
 from calibrations.table import Table
-from rig.errors import RecordError, UnknownRun
+from rig.errors import RecordError, RigError, UnknownRun
 
 if TYPE_CHECKING:
     from rig.record.store import Record
@@ -105,6 +105,25 @@ SEPARATOR = " + "  # between their names, where one text names all
 def names_of(data: str) -> list[str]:
     """The runs and files that a text names: `A + B` names two."""
     return [data] if Path(data).exists() else [name.strip() for name in data.split(SEPARATOR)]
+
+
+def with_run_ids(data: str) -> str:
+    """The same data by the id of each run, which stays valid: for `last sweep`, the present one. Other names stay."""
+    return SEPARATOR.join(_with_run_id(name) for name in names_of(data))
+
+
+def _with_run_id(name: str) -> str:
+    selector, slash, sensor = name.partition("/")
+    if Path(name).exists() or not selector:
+        return name
+    from rig.record.store import Record  # as above
+
+    try:
+        with Record.to_find(selector) as record:
+            run = record.run(selector)
+    except (RigError, OSError):  # the analysis says what is wrong with the name
+        return name
+    return name if run.batch and not slash else f"{run.run}{slash}{sensor}"
 
 
 def load_all(names: Sequence[str], notify: Callable[[str], None] = lambda _: None) -> Table:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import html
 import logging
+import os
 import re
-from collections.abc import Awaitable, Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -20,8 +21,10 @@ from drivers.errors import DriverError
 from procedures.errors import ProcedureError
 from procedures.settings import split_unit
 from rig.errors import RigError
+from rig.files import home
 from rig.services.page_words import PageStep, page_step
 from rig.services.search import Cancelled
+from rig.web.desk import FILES
 
 R = TypeVar("R")
 PROGRESS_S = 0.5  # the text shows whole seconds; more often costs a busy server time
@@ -126,7 +129,7 @@ def show_error(title: str, reason: str | Exception, data: str = "", addresses: M
     """An error message. `data`: the run or file that it is about; `addresses`: further buttons by their labels."""
     step = page_step(reason if isinstance(reason, str) else raw_message(reason), data)
     with box("error").props("role=alert"):
-        words(title, "title")
+        words(for_page(title), "title")
         words(for_page(step.text), "why quiet").style("white-space: pre-wrap")
         buttons({**step.to, **(addresses or {})})
 
@@ -228,7 +231,8 @@ def raw_message(error: Exception) -> str:
 
 
 def for_page(text: str) -> str:
-    """A sentence of the command line with typographic signs: −, ±, ×, µ, °C."""
+    """A sentence of the command line with typographic signs (−, ±, ×, µ, °C) and the own names of uploaded files."""
+    text = text.replace(f"{home() / FILES}{os.sep}", "")
     signs = re.sub(r"(?<![\w.)\]-])-(?=\d)", "−", text.replace("+-", "±"))
     signs = re.sub(r"(?<=\d )u(?=[Vg]\b)", "µ", signs)
     signs = re.sub(r"(?<=\d) (deg)?C\b", " °C", signs)
@@ -253,3 +257,11 @@ def setting_label(name: str) -> str:
     head, stated_unit = split_unit(name)
     spelt = {"um": "µm"}.get(stated_unit, unit(stated_unit))
     return f"{head.replace('_', ' ')} ({spelt})" if spelt else head.replace("_", " ")
+
+
+def with_labels(text: str, names: Iterable[str]) -> str:
+    """A message with the labels of settings in place of their names: "step (deg)" for step_deg."""
+    for name in sorted(names, key=len, reverse=True):
+        if "_" in name:
+            text = re.sub(rf"(?<![\w-]){re.escape(name)}(?!\w)", f'"{setting_label(name)}"', text)
+    return text

@@ -7,7 +7,7 @@ import logging
 import signal
 import socket
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from urllib.parse import parse_qs
 
@@ -24,6 +24,7 @@ from calibrations.presentation.charts.fit import fit_album
 from calibrations.presentation.second_core import SecondCore
 from calibrations.table import Table
 from rig.errors import RigError
+from rig.files import home, write_whole
 from rig.runs.signals import signal_handlers
 from rig.web.calculations import begin, leave_calculations
 from rig.web.desk import Desk
@@ -40,16 +41,18 @@ RETURN_S = 20.0  # a browser that lost the connection may come back so long; its
 LEFT = 1001  # the code with which a browser closes the connection of a page that it leaves (RFC 6455, 7.4.1)
 PING_S, ANSWER_S = 8.0, 20.0  # between two looks at a connection, and until it counts as lost: an analysis delays both
 PORT = 8473  # preferred, so that an open page finds a restarted server
+PORT_FILE = "web-port"
 POSES = 36  # of the analysis at the start
 
 
 @dataclass(frozen=True)
 class Place:
-    """Address of the workbench, and the token for access."""
+    """Address of the workbench, and the token for access. `taken`: ports that other programs use."""
 
     host: str
     port: int
     token: str
+    taken: tuple[int, ...] = ()
 
     @property
     def url(self) -> str:
@@ -60,10 +63,10 @@ class Place:
 def serve(desk: Desk, host: str, port: int | None, token: str, ready: Callable[[Place], None]) -> None:
     """Serve until SIGINT or SIGTERM; calls `ready` with the address when pages can be opened.
 
-    Raises RigError if the address is not available; without `port` any free port is used.
+    Raises RigError if the address is not available; without `port` it is the last one of this user, else any free one.
     """
-    listener = _listen(host, port)
-    place = Place(host, listener.getsockname()[1], token)
+    listener, taken = _listen(host, port)
+    place = Place(host, listener.getsockname()[1], token, taken)
     app = FastAPI(openapi_url=None)
     register(desk)
     translations["en-US"] |= LOST
@@ -129,14 +132,42 @@ class _Server(uvicorn.Server):
         self._ready()
 
 
-def _listen(host: str, port: int | None) -> socket.socket:
-    """A socket that listens at the address. Raises RigError."""
+def _listen(host: str, port: int | None) -> tuple[socket.socket, tuple[int, ...]]:
+    """A socket that listens at the address, and the ports that were taken. Raises RigError."""
+    if port is not None:
+        try:
+            return _open_listening_socket(host, port), ()
+        except OSError as error:
+            raise RigError(f"cannot listen at {host}:{port}: {error.strerror}; give another --port or --host") from None
+    taken = []
+    for preferred in dict.fromkeys((*_last_port(), PORT)):
+        try:
+            listener = _open_listening_socket(host, preferred)
+        except OSError:
+            taken.append(preferred)
+        else:
+            _keep_port(preferred)
+            return listener, tuple(taken)
+    listener = _open_listening_socket(host, 0)
+    _keep_port(listener.getsockname()[1])
+    return listener, tuple(taken)
+
+
+# The port is kept for the user, as the token is: a bookmark lasts where another program has the usual port.
+
+
+def _last_port() -> tuple[int, ...]:
+    """The port of this user's last start without --port; empty without one."""
     try:
-        return _open_listening_socket(host, PORT if port is None else port)
-    except OSError as error:
-        if port is None:
-            return _open_listening_socket(host, 0)
-        raise RigError(f"cannot listen at {host}:{port}: {error.strerror}; give another --port or --host") from None
+        return (int((home() / PORT_FILE).read_text(encoding="ascii")),)
+    except (OSError, ValueError):
+        return ()
+
+
+def _keep_port(port: int) -> None:
+    """Keep the port for the next start; without room on the disk the next one may have another."""
+    with suppress(RigError, OSError):
+        write_whole(home() / PORT_FILE, str(port))
 
 
 def _open_listening_socket(host: str, port: int) -> socket.socket:

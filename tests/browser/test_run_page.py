@@ -65,6 +65,8 @@ def test_a_newcomer_gets_from_the_empty_record_to_the_falling_error(workbench: W
     workbench.shot(page, "plan")
     begin(page)
     phase(page, "running")
+    expect(page.get_by_role("button", name="Start")).to_be_disabled()
+    expect(page.get_by_text("Start waits until the present run ends.")).to_be_visible()
     expect(page.get_by_role("button", name="Stop")).to_have_count(2)  # at the run, and in the head of every page
     expect(page.locator(".tiles").get_by_text("as usual").first).to_be_visible()
     expect(page.locator(".tiles").get_by_text("−20 to 85 °C")).to_be_visible()
@@ -131,7 +133,7 @@ def test_questions_are_asked_and_a_wrong_answer_is_refused(workbench: Workbench)
 
 def test_a_plan_that_cannot_be_says_why_and_does_not_start(workbench: Workbench) -> None:
     page = workbench.visit("/run?procedure=sweep&step_deg=ten")
-    expect(page.get_by_role("alert")).to_contain_text("step_deg is 'ten'; give a number")
+    expect(page.get_by_role("alert")).to_contain_text("\"step (deg)\" is 'ten'; give a number")
     expect(page.get_by_role("button", name="Start")).to_be_disabled()
 
 
@@ -222,7 +224,10 @@ def test_a_run_begins_after_the_checks_and_no_single_key_moves_anything(workbenc
         run = record.runs()[0]
         assert run.constants["serial"] == "17"
         assert next(event.what for event in record.events(run.run)) == "answer mounting"
+    expect(page.get_by_role("button", name="Start")).to_be_enabled()
     page.get_by_role("button", name="Resume").click()
+    for text in ("Recorded", "Takes", "the whole run", "Turns alpha", "Stops", "no object or person is in the way"):
+        expect(page.get_by_role("dialog").get_by_text(text).first).to_be_visible()
     expect(page.get_by_role("dialog").get_by_role("button", name="Begin")).to_be_disabled()
     workbench.shot(page, "resume")
     page.get_by_role("button", name="Cancel").click()

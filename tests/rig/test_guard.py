@@ -179,5 +179,5 @@ def test_an_oven_that_runs_away_is_noticed_while_the_run_waits() -> None:
 
 def test_two_servers_that_start_at_once_listen_on_different_ports() -> None:
     """Neither has accepted a connection yet when the other binds."""
-    with _listen("127.0.0.1", None) as first, _listen("127.0.0.1", None) as second:
+    with _listen("127.0.0.1", None)[0] as first, _listen("127.0.0.1", None)[0] as second:
         assert first.getsockname()[1] != second.getsockname()[1]

@@ -63,6 +63,23 @@ def test_a_full_disk_stops_the_run_which_goes_on_when_there_is_room(tmp_path: Pa
         assert resume(record, run.run, Onlooker()).run.state == "complete"
 
 
+def test_a_run_whose_end_does_not_fit_on_the_disk_is_not_called_running(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    set_state = Record.set_state
+
+    def full(record: Record, run: str, state: str, *more: Any) -> None:
+        if state != "running":
+            raise RecordError("the disk is full")
+        set_state(record, run, state, *more)
+
+    with Record(tmp_path) as record:
+        monkeypatch.setattr(Record, "set_state", full)
+        outcome = swept(record, lambda: fill(record))
+    assert (outcome.run.state, outcome.run.rows) == ("failed", KEPT)
+    assert outcome.run.message == str(outcome.error)
+
+
 def test_a_record_that_goes_away_stops_the_run(tmp_path: Path) -> None:
     home, away = tmp_path / "home", tmp_path / "away"
     with Record(home) as record, looking_on() as aftermath:

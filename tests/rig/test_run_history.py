@@ -65,7 +65,7 @@ def test_a_part_that_was_killed_is_named_where_the_run_goes_on() -> None:
     killed = _turns(lines(("begun", "sweep at pose 0"), ("begun", "sweep at pose 3"), ("complete", "")))
     assert [(turn.what, turn.text) for turn in killed] == [
         ("begun", "sweep at pose 0"),
-        ("resumed", "sweep at pose 3; the part before it was killed"),
+        ("resumed", "sweep at pose 3; before, its process was killed or the disk was full"),
         ("complete", ""),
     ]
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from calibrations.text import join_words
 from rig.cli.terminal.output import FILE, json_option, note
 
 if TYPE_CHECKING:
@@ -18,7 +19,9 @@ LOCAL_HOSTS = ("127.0.0.1", "localhost", "::1")
 
 
 @click.command("web")
-@click.option("--port", type=click.IntRange(1, 65535), help="Port. Default: 8473, or any free port.")
+@click.option(
+    "--port", type=click.IntRange(1, 65535), help="Port. Default: that of the last start, else 8473 or any free one."
+)
 @click.option(
     "--host",
     default=LOCAL_HOSTS[0],
@@ -64,6 +67,11 @@ def web_command(
             click.echo(json.dumps({"schema": "rig.web/1", "url": place.url, "host": place.host, "port": place.port}))
         else:
             click.echo(f"The workbench is at {place.url}\nCtrl-C ends it.")
+        if place.taken:
+            note(
+                f"Another program, perhaps another workbench, uses port {join_words(map(str, place.taken))}. The next "
+                f"start takes port {place.port} again, so this address lasts. --port chooses a port."
+            )
         if not no_open and not as_json:
             webbrowser.open(place.url)
 

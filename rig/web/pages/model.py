@@ -18,6 +18,7 @@ from rig.services.content import Content, content_of
 from rig.services.exclusion import find_numbered_run
 from rig.services.page_words import IMPORT, address
 from rig.services.search import Cancelled
+from rig.services.tables import with_run_ids
 from rig.web.address import ModelState, parse_state
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import Desk, runs
@@ -67,7 +68,7 @@ class Workbench:
     def build(self) -> None:
         """Build the page; long computations start when the browser shows it."""
         try:
-            self.data = self.data or _newest_run()
+            self.data = with_run_ids(self.data) or _newest_run()
         except RecordError as error:  # for example a lab that does not answer
             with frame(self.desk, "/"):
                 show_error("The record cannot be read", error)
@@ -138,7 +139,7 @@ class Workbench:
 
     async def open(self) -> None:
         """Read the data, fit the model, and show the session."""
-        self.verdict.wait(f"Reading {self.data}", self.visit)
+        self.verdict.wait(for_page(f"Reading {self.data}"), self.visit)
         self.verdict.offer_cancel(self.visit.cancel)
         try:
             session = await self.visit.work(self.desk.open, self.data, self.model, self.requested.added, self.noise)
@@ -169,7 +170,7 @@ class Workbench:
         """The person cancelled the fit: nothing is shown."""
         if self.visit.closed:
             return
-        with afresh(self.body), state("The analysis was cancelled", f"{self.data} is unchanged."):
+        with afresh(self.body), state("The analysis was cancelled", for_page(f"{self.data} is unchanged.")):
             ui.button("Analyse again", icon="refresh", on_click=partial(self.go, self.data, self.model, self.noise))
 
     def _show_places(self, compared: Comparison[Any]) -> None:
@@ -208,7 +209,7 @@ class Workbench:
         extent_text = f"{present.extent} by now; " if is_changed and present.extent else ""
         subject = f"{self.data} is still running" if present.growing else f"{self.data} or the model has changed"
         with self.newer, box("note row-of").props("role=status"):
-            words(f"{subject}: {extent_text}this page analyses {self.session.data.description}.", "grow")
+            words(for_page(f"{subject}: {extent_text}this page analyses {self.session.data.description}."), "grow")
             if is_changed:
                 ui.button("Update", icon="refresh", on_click=self._update).props("dense")
 

@@ -14,6 +14,7 @@ from nicegui import ui
 
 from calibrations.text import duration
 from procedures.catalogue import Procedure, find, paths, summary
+from procedures.errors import SettingError
 from procedures.settings import choices, meaning, parse, setting_text
 from rig.bench import Bench, read_bench
 from rig.bench.certificates import find_expired
@@ -30,7 +31,7 @@ from rig.web.frame import Key, frame
 from rig.web.pages.run_begin import BeginDialog, before_start, plan_facts
 from rig.web.pages.run_live import Live
 from rig.web.pages.run_optimal import OptimalDialog
-from rig.web.parts import box, button, div, facts, message, setting_label, show_error, shown, table, words
+from rig.web.parts import box, button, div, facts, message, setting_label, show_error, shown, table, with_labels, words
 
 MOST_STRETCHES = 12
 DEFAULT_PROCEDURE = "sweep"
@@ -246,7 +247,10 @@ class PlanForm:
         self.waits.set_text("Start waits until the present run ends." if self.under_way else "")
 
     def _plan(self, procedure: Procedure, settings: Mapping[str, str]) -> Plan:
-        planned = plan(self.bench, procedure, parse(procedure, settings))
+        try:
+            planned = plan(self.bench, procedure, parse(procedure, settings))
+        except SettingError as error:
+            raise SettingError(with_labels(str(error), procedure.defaults)) from error
         if planned.reach:
             strip(mounting(planned))  # drawn and kept before a person clicks on Start
         return planned

@@ -223,6 +223,8 @@ def register(desk: Desk) -> None:
                 show_error("There is no such run", error)
                 ui.link("All runs", "/record")
                 return
+            if run != recorded_run.run:  # such as `last`, which is another run tomorrow
+                ui.timer(0.0, partial(ui.navigate.history.replace, f"/record/{recorded_run.run}"), once=True)
             OneRun(desk, recorded_run, excluded, run_counts)
 
 
