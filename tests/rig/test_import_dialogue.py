@@ -109,7 +109,7 @@ POSES = "alpha_deg,beta_deg,vx_v,vy_v,time,pressure\n" + "\n".join(
 )
 
 
-def test_the_terminal_takes_what_the_page_proposes_for_further_columns(tmp_path: Path, rig: Callable[..., Any]) -> None:
+def test_the_terminal_takes_what_the_page_proposes_for_further_columns(tmp_path: Path, rig: Rig) -> None:
     (path := tmp_path / "poses.csv").write_text(POSES.format(times=[10 * k for k in range(36)]))
     page = {m.file_column: m.name for m in proposal(open_file(path)).columns.values() if m is not None}
     assert page["time"] == "t_s"
@@ -127,9 +127,7 @@ def test_the_terminal_takes_what_the_page_proposes_for_further_columns(tmp_path:
     assert "is taken" not in stated.err
 
 
-def test_a_time_without_a_likely_unit_is_not_taken_before_its_unit_is_stated(
-    tmp_path: Path, rig: Callable[..., Any]
-) -> None:
+def test_a_time_without_a_likely_unit_is_not_taken_before_its_unit_is_stated(tmp_path: Path, rig: Rig) -> None:
     (path := tmp_path / "poses.csv").write_text(POSES.format(times=[10_000 * k for k in range(36)]))
     refused = rig("import", str(path))
     assert refused.status == 2
