@@ -24,6 +24,7 @@ from drivers.transport.address import Url
 from drivers.transport.faults import Faults
 from drivers.transport.gcs import Gcs
 from drivers.transport.gcs_server import commands
+from drivers.transport.link import Link
 from drivers.transport.modbus import Bus
 from drivers.transport.modbus_server import ILLEGAL_ADDRESS, Refusal, Responder
 from drivers.world.config import WorldConfig
@@ -33,6 +34,8 @@ from tests.fuzz.target import Target
 
 class Said:
     """A wire on which one answer comes, in two pieces, and then nothing; time is what was waited."""
+
+    until = Link.until
 
     def __init__(self, url: str, data: bytes) -> None:
         self.url, self.clock, self._now_s = url, self, 0.0
