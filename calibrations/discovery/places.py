@@ -19,7 +19,7 @@ from calibrations.fitting.fit import Fit, axis_of, milli_unit, scales
 from calibrations.means.noise import most_scatter, rms
 from calibrations.model.chain import backward
 from calibrations.table import Array, Table, in_time, time_origin
-from calibrations.text import interval
+from calibrations.text import interval, milli_amount
 
 MOST_PLACES = 8
 PARTS = 8  # of a column without a natural grid
@@ -58,11 +58,16 @@ class _Stretch:
     @property
     def _text(self) -> str:
         """The place in words, with the mean residual there in the output's unit and in the sensed unit."""
-        milli_value = 1e3 * self.mean / self.scale
-        output_text = f"{1e3 * self.mean:+.3g} mV" if self.unit == "V" else f"{self.mean:+.3g} {self.unit}"
+        sensed_text = _signed(1e3 * self.mean / self.scale, self.milli)
+        output_text = _signed(1e3 * self.mean, "mV") if self.unit == "V" else f"{self.mean:+.3g} {self.unit}"
         sensed = self.unit in ("g", "field") or self.milli == f"m{self.unit}"
-        value = f"{milli_value:+.3g} {self.milli}" if sensed else f"{output_text} ({milli_value:+.3g} {self.milli})"
+        value = sensed_text if sensed else f"{output_text} ({sensed_text})"
         return f"{self.words}: {self.channel} is off by {value} on average, rms {self.excess:.3g} x the noise floor"
+
+
+def _signed(value: float, unit_name: str) -> str:
+    """A value with its sign, in ASCII: `+12.0 mV`, `-9.45 uV`."""
+    return f"{'+' if value > 0 else ''}{milli_amount(value, unit_name)}".replace("−", "-").replace("µ", "u")
 
 
 def places(fit: Fit) -> tuple[Place, ...]:

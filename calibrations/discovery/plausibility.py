@@ -48,6 +48,7 @@ from calibrations.geometry.orientation import reported_force
 from calibrations.geometry.rate_table import turn_axes
 from calibrations.means.noise import rms, white_std
 from calibrations.table import AXES, Array, Table
+from calibrations.text import quantity
 
 ROUNDS = 20  # of a regression in two clusters
 # Of the rows, those at which the groups differ by so many times what they leave: an effect of a few poses divides the
@@ -136,8 +137,8 @@ def _silent(output: Array, stated_response: Response, k: int, name: str, floor: 
     if noise and fdtrc(3, n - 4, max(share, 0.0) / 3 / ((1 - share) / (n - 4))) < WEAK_RESPONSE:
         return None
     if noise:
-        return f"{name} is only noise ({1e3 * spread:.3g} mV rms) while gravity along {AXES[k]} changes"
-    return f"{name} does not follow the poses: they explain {share:.0%} of its variation of {1e3 * spread:.3g} mV rms"
+        return f"{name} is only noise ({quantity(spread, 'V')} rms) while gravity along {AXES[k]} changes"
+    return f"{name} does not follow the poses: they explain {share:.0%} of its variation of {quantity(spread, 'V')} rms"
 
 
 def _of_rates(table: Table) -> Iterator[Finding]:

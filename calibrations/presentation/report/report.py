@@ -236,7 +236,10 @@ def spread_of_excess(fit: Fit) -> float:
 def _places(comparison: Comparison[Fit]) -> tuple[Block, ...]:
     if not comparison.fails:
         return (NO_PLACE,)
-    texts = [capital(minus(place.text)).replace("x the noise", "× the noise") for place in comparison.fails]
+    signs = {"x the noise": "× the noise", " uV": " µV", " ug": " µg"}
+    texts = [capital(minus(place.text)) for place in comparison.fails]
+    for ascii_sign, sign in signs.items():
+        texts = [text.replace(ascii_sign, sign) for text in texts]
     return PLACES, Items(texts)
 
 
