@@ -94,6 +94,8 @@ def letters(make: Callable[[Port], Any]) -> Callable[[bytes], object]:
     def take(data: bytes) -> object:
         port, now_s = Port(), float(clock_s())
         twin: Any = make(port)
+        if hasattr(twin, "speak"):
+            twin.restore({"running": True, "next_s": now_s})  # else it sends all lines since power-on
         heard = twin._answer
         for piece in (data[: len(data) // 2], data[len(data) // 2 :]):
             port.client.inbox += piece
