@@ -31,10 +31,12 @@ from drivers.world.kernel import record
 from procedures.hand_fields import hand_fields
 from procedures.hand_positions import hand_positions
 from procedures.hand_turns import hand_turns
+from procedures.session import Dwell, Session
 from rig.instruments.by_hand import HandAnalysis
 from rig.record.turns import is_turn, turn_columns
 from tests.procedures.bench import Adc, Book, session
 
+CALM = Hand(slips=0.0, errs=0.0, clings=0.0)
 RATE_HZ = 200.0
 DEG = np.pi / 180
 ENOUGH = 12  # intervals for imu_tk
@@ -83,6 +85,12 @@ class SlowAdc(Adc):
             yield Samples(self.world.adc_volts(self.channels, start_s, 1 / RATE_HZ, n), self.channels, RATE_HZ, start_s)
 
 
+def hand_session(world: HandheldWorld, dwells: tuple[Dwell, ...] = ()) -> tuple[Session, Book]:
+    """A session in which a hand turns the sensor, and what it records."""
+    rig, book = session(world, dwells=dwells)
+    return replace(rig, adc=SlowAdc(world), by_hand=HandAnalysis()), book
+
+
 def world_of(seed: int, hand: Hand | None = None) -> HandheldWorld:
     """One sensor and one hand."""
     return HandheldWorld(WorldConfig.ideal(), seed, Handheld(hand=hand or Hand()))
@@ -102,8 +110,8 @@ def truth(world: HandheldWorld) -> Calibration:
 def by_procedure(seed: int, hand: Hand | None = None, target_g: float = 0.001) -> Calibration:
     """hand-positions, with the estimate of all programs here."""
     world = world_of(seed, hand)
-    rig, book = session(world)
-    hand_positions(replace(rig, adc=SlowAdc(world), by_hand=HandAnalysis()), target_g=target_g)
+    rig, book = hand_session(world)
+    hand_positions(rig, target_g=target_g)
     means = np.array([[dwell.means[name] for name in FORCES] for dwell in book.dwells])
     b, M, _ = magnitude_fit(means)
     return Calibration(b, M, len(means), world.now_s)
@@ -257,8 +265,8 @@ def fields_by_procedure(
 ) -> FieldErrors:
     """hand-fields, with the ellipsoid of its means by an estimate of its own."""
     world = field_world(seed, hand, **laboratory)
-    rig, book = session(world)
-    hand_fields(replace(rig, adc=SlowAdc(world), by_hand=HandAnalysis()), target_percent=target_percent)
+    rig, book = hand_session(world)
+    hand_fields(rig, target_percent=target_percent)
     means = np.array([[dwell.means[name] for name in FIELDS] for dwell in book.dwells])
     hard_iron, M, _ = magnitude_fit(means)
     true_iron, true_root = true_ellipsoid(world)
@@ -317,8 +325,8 @@ class TurnErrors:
 def turns_by_procedure(seed: int, hand: Hand | None = None, **settings: Any) -> TurnErrors:
     """hand-turns, and the fit of its turns."""
     world = turn_world(seed, hand)
-    rig, book = session(world)
-    hand_turns(replace(rig, adc=SlowAdc(world), by_hand=HandAnalysis()), **settings)
+    rig, book = hand_session(world)
+    hand_turns(rig, **settings)
     return turn_errors(world, book)
 
 

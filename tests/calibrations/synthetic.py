@@ -48,3 +48,10 @@ def gauss_markov(rng: np.random.Generator, std: float, tau_s: float, gaps: Array
         phi = np.exp(-gaps[i] / tau_s)
         x[i] = phi * x[i - 1] + std * np.sqrt(1 - phi**2) * rng.standard_normal()
     return x
+
+
+def directions(n: int) -> Array:
+    """Unit vectors spread over the sphere, shape (n, 3)."""
+    z = 1 - (2 * np.arange(n) + 1) / n
+    turn = np.pi * (1 + np.sqrt(5)) * np.arange(n)
+    return np.column_stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z])

@@ -18,7 +18,7 @@ from calibrations.fitting.fit import fit
 from calibrations.loop import dataset, diagnose, discover
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
-from tests.calibrations.synthetic import NOISE_V, components, poses, turns
+from tests.calibrations.synthetic import NOISE_V, components, directions, poses, turns
 from tests.slow import first_fast
 
 LINEAR = read_model("linear")
@@ -27,13 +27,6 @@ COMMON = read_model("common-scale")
 
 def names(found: Discovery) -> list[str]:
     return [step.name for step in found.steps]
-
-
-def directions(n: int) -> Array:
-    """Unit vectors spread over the sphere, shape (n, 3)."""
-    z = 1 - (2 * np.arange(n) + 1) / n
-    turn = np.pi * (1 + np.sqrt(5)) * np.arange(n)
-    return np.column_stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z])
 
 
 def positions(outputs: Array, noise: float = 5e-5, seed: int = 0) -> Table:

@@ -11,17 +11,11 @@ from scipy.signal import lfilter
 from calibrations.errors import DataError
 from calibrations.importing.raw_logs import average_still_positions, is_raw_log, still_intervals
 from calibrations.table import Array, Table
+from tests.calibrations.synthetic import directions
 
 RATE_HZ = 100.0
 NOISE = 2e-3  # g, of a sample
 STILL_S, MOVING_S = 4.0, 1.5
-
-
-def directions(n: int) -> Array:
-    """Unit vectors spread over the sphere, shape (n, 3)."""
-    z = 1 - (2 * np.arange(n) + 1) / n
-    turn = np.pi * (1 + np.sqrt(5)) * np.arange(n)
-    return np.column_stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z])
 
 
 def held(n: int = 8, seed: int = 0, sway: float = 0.0) -> tuple[Array, list[tuple[int, int]]]:

@@ -155,6 +155,11 @@ def small_bench(seed: int = 0) -> SmallBench:
 
 
 @pytest.fixture
+def clock() -> SimulatedClock:
+    return SimulatedClock()
+
+
+@pytest.fixture
 def make_bench() -> Iterator[Callable[..., SmallBench]]:
     """Build a bench with a seed; all are closed at the end."""
     benches: list[SmallBench] = []

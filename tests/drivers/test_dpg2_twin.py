@@ -45,11 +45,6 @@ class Plate:
 
 
 @pytest.fixture
-def clock() -> SimulatedClock:
-    return SimulatedClock()
-
-
-@pytest.fixture
 def serve(clock: SimulatedClock) -> Iterator[Callable[..., LevelServer]]:
     servers: list[LevelServer] = []
 

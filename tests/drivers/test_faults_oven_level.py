@@ -25,11 +25,6 @@ def world() -> World:
 
 
 @pytest.fixture
-def clock() -> SimulatedClock:
-    return SimulatedClock()
-
-
-@pytest.fixture
 def oven(world: World, clock: SimulatedClock) -> Iterator[Callable[..., omega_cn7500.Oven]]:
     """The driver on its twin in the physical world, with faults."""
     links, settings = Links(clock), omega_cn7500.Settings()

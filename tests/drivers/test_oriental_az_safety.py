@@ -22,11 +22,6 @@ Make = Callable[..., oriental_az.RotaryStage]
 
 
 @pytest.fixture
-def clock() -> SimulatedClock:
-    return SimulatedClock()
-
-
-@pytest.fixture
 def server(small_world: Any, clock: SimulatedClock) -> Iterator[Server]:
     served = oriental_az_twin.serve(small_world, {"alpha": (1, LIMITED)})
     clock.attach(served)

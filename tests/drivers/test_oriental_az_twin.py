@@ -31,11 +31,6 @@ Ask = Callable[[str], str]
 
 
 @pytest.fixture
-def clock() -> SimulatedClock:
-    return SimulatedClock()
-
-
-@pytest.fixture
 def ask(small_world: Any, clock: SimulatedClock) -> Iterator[Ask]:
     """Send hexadecimal bytes to a bus with unit 1 (100 steps/deg, standing at 7 deg) and give the answer's."""
     server = oriental_az_twin.serve(small_world, {"alpha": (1, Settings(steps_per_turn=36000))})

@@ -26,11 +26,6 @@ Ask = Callable[[str], str]
 
 
 @pytest.fixture
-def clock() -> SimulatedClock:
-    return SimulatedClock()
-
-
-@pytest.fixture
 def server(small_world: Any, clock: SimulatedClock) -> Iterator[Server]:
     served = pi_e727_twin.serve(small_world, {"positioner": (1, Settings())})
     clock.attach(served)

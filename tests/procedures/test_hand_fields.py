@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from drivers.handheld.hand import Hand
-from procedures.errors import NoAnswer, SettingError
 from procedures.hand_fields import hand_fields
 from procedures.session import Dwell
-from rig.instruments.by_hand import HandAnalysis
-from tests.handling import FIELDS, FieldErrors, SlowAdc, field_world, fields_by_procedure, true_ellipsoid
-from tests.procedures.bench import Book, session
+from tests.handling import (
+    CALM,
+    FIELDS,
+    FieldErrors,
+    field_world,
+    fields_by_procedure,
+    hand_session,
+    true_ellipsoid,
+)
+from tests.procedures.bench import Book
 
-CALM = Hand(slips=0.0, errs=0.0, clings=0.0)
 FEWEST = 12
 MAGNET = {"x_mm": 0.0, "z_mm": -80.0, "moment_z_ma_m2": 40.0}  # below the table
 
@@ -26,8 +30,8 @@ def taken(
     hand: Hand = CALM, dwells: tuple[Dwell, ...] = (), place: Mapping[str, Any] | None = None, **settings: Any
 ) -> Book:
     world = field_world(1, hand, **(place or {}))
-    rig, book = session(world, dwells=dwells)
-    hand_fields(replace(rig, adc=SlowAdc(world), by_hand=HandAnalysis()), **settings)
+    rig, book = hand_session(world, dwells)
+    hand_fields(rig, **settings)
     return book
 
 
@@ -97,19 +101,6 @@ def test_a_magnet_in_the_table_is_reported_and_does_not_pass(calm: Book) -> None
     assert len(book.dwells) == 16
     assert "the magnitude of the field differs by" in book.guided[-1].text
     assert not any("magnitude of the field" in guidance.text for guidance in calm.guided)
-
-
-def test_a_hand_that_never_lets_go_is_told_so() -> None:
-    with pytest.raises(NoAnswer, match=r"no new position for 20 s; needed: .* times the noise at rest"):
-        taken(replace(CALM, clings=1.0, clings_s=1e4), wait_s=20.0)
-
-
-@pytest.mark.parametrize(
-    "settings", [{"target_percent": 0.0}, {"rest_s": 0.5}, {"most_positions": 9}, {"wait_s": 0.0}], ids=str
-)
-def test_settings_out_of_range_are_refused(settings: Mapping[str, Any]) -> None:
-    with pytest.raises(SettingError, match="hand-fields: target_percent"):
-        taken(**settings)
 
 
 def test_a_clumsy_hand_takes_longer_and_is_not_worse() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,29 +13,19 @@ from calibrations.geometry.turns import make_turns
 from calibrations.table import Table
 from drivers.handheld.hand import Hand
 from drivers.recorder import Samples
-from procedures.errors import NoAnswer, SettingError
 from procedures.hand_turns import TURN, hand_turns
-from procedures.session import Session
-from rig.instruments.by_hand import HandAnalysis
 from rig.record.measured import turns_table
 from rig.record.turns import is_turn, turn_columns
 from rig.record.values import Run
-from tests.handling import SlowAdc, turn_errors, turn_world, turns_by_procedure
-from tests.procedures.bench import Book, session
+from tests.handling import CALM, SlowAdc, hand_session, turn_errors, turn_world, turns_by_procedure
+from tests.procedures.bench import Book
 
-CALM = Hand(slips=0.0, errs=0.0, clings=0.0)
 FEWEST = 12
-
-
-def rig_with(hand: Hand = CALM, seed: int = 1) -> tuple[Session, Book]:
-    world = turn_world(seed, hand)
-    rig, book = session(world)
-    return replace(rig, adc=SlowAdc(world), by_hand=HandAnalysis()), book
 
 
 @pytest.fixture(scope="module")
 def calm() -> Book:
-    rig, book = rig_with()
+    rig, book = hand_session(turn_world(1, CALM))
     hand_turns(rig)
     return book
 
@@ -94,7 +84,7 @@ def test_the_table_of_a_run_has_the_constants_that_turns_need(calm: Book) -> Non
 
 def test_a_run_that_was_interrupted_goes_on_with_its_turns(calm: Book) -> None:
     """It ended after a turn and before the rest: the turn does not count, and the next rest begins anew."""
-    rig, book = rig_with()
+    rig, book = hand_session(turn_world(1, CALM))
     book.blocks, book.dwells = list(calm.blocks[:14]), list(calm.dwells[:14])
     assert is_turn(book.blocks[-1].pose)
     hand_turns(rig)
@@ -135,7 +125,7 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", list(FAULTS))
 def test_a_turn_that_cannot_be_used_is_kept_and_said(fault: str) -> None:
-    rig, book = rig_with()
+    rig, book = hand_session(turn_world(1, CALM))
     adc = FaultyAdc(book.world, channels=("vx", "vy"))
     adc.spoil = FAULTS[fault]
     hand_turns(replace(rig, adc=adc))
@@ -147,24 +137,9 @@ def test_a_turn_that_cannot_be_used_is_kept_and_said(fault: str) -> None:
 
 
 def test_a_smaller_target_takes_more_turns() -> None:
-    rig, book = rig_with()
+    rig, book = hand_session(turn_world(1, CALM))
     hand_turns(rig, target_percent=1e-6, most_positions=13)
     assert sum(not is_turn(block.pose) for block in book.blocks) == 13
-
-
-def test_a_hand_that_never_lets_go_is_told_so() -> None:
-    rig, _ = rig_with(replace(CALM, clings=1.0, clings_s=1e4))
-    with pytest.raises(NoAnswer, match=r"no new position for 20 s; needed: .* times the noise at rest"):
-        hand_turns(rig, wait_s=20.0)
-
-
-@pytest.mark.parametrize(
-    "settings", [{"target_percent": 0.0}, {"rest_s": 0.5}, {"most_positions": 9}, {"wait_s": 0.0}], ids=str
-)
-def test_settings_out_of_range_are_refused(settings: Mapping[str, Any]) -> None:
-    rig, _ = rig_with()
-    with pytest.raises(SettingError, match="hand-turns: target_percent"):
-        hand_turns(rig, **settings)
 
 
 def test_a_clumsy_hand_is_not_worse() -> None:
