@@ -10,9 +10,9 @@ from calibrations.analyses import hand_turns as turns
 from calibrations.analyses.hand_positions import ANGLES, fit_positions, largest_uncertainty_g
 from calibrations.geometry.sphere import magnetometer_coverage_warning
 from calibrations.means.noise import rms
-from rig.bench.result_names import SOFT_IRON_PAIRS
+from rig.bench.result_names import RESULTS
 from rig.record.measured import MeasuredRun
-from rig.results.result import Missing, Result, evaluates, result
+from rig.results.result import Missing, Result, ellipsoid, estimates, evaluates, gyroscope, result
 
 
 class Target(NamedTuple):
@@ -44,9 +44,7 @@ def hand_positions(measured: MeasuredRun) -> dict[str, Result | Missing]:
     The uncertainty is Missing if it is above 1.2 times the setting target_g: the run ended at most_positions.
     """
     fit = fit_positions(measured.table())
-    results = {f"bias-{e.axis}": result(e) for e in fit.model.estimates("bias")}
-    results |= {f"scale-{e.axis}": result(e) for e in fit.model.estimates("scale-factor")}
-    results |= {f"nonorthogonality-{e.name}": result(e) for e in fit.model.estimates(ANGLES)}
+    results = estimates(fit, "bias", "scale-factor", ANGLES)
     worst_g, parameter = largest_uncertainty_g(fit)
     known = f"{parameter} is known to {1e3 * worst_g:.3g} mg only"
     return results | _uncertainty(measured, worst_g, known, "positions", TARGET_G)
@@ -67,14 +65,10 @@ def hand_fields(measured: MeasuredRun) -> dict[str, Result | Missing]:
     """
     table = measured.table()
     if reason := magnetometer_coverage_warning(table):
-        names = (*(f"hard-iron-{axis}" for axis in "xyz"), *(f"soft-iron-{pair}" for pair in SOFT_IRON_PAIRS))
-        return {name: Missing(reason) for name in (*names, "field-total", "left-by-ellipsoid", "uncertainty")}
+        return {name: Missing(reason) for name in RESULTS["hand-fields"]}
     fit = fields.fit_fields(table)
     (strength,) = fit.model.estimates("field-strength")
-    results = {f"hard-iron-{e.axis}": result(e) for e in fit.model.estimates("hard-iron")}
-    results |= {f"soft-iron-{e.name}": result(e) for e in fit.model.estimates("soft-iron")}
-    results |= {"field-total": result(strength)}
-    results |= {"left-by-ellipsoid": Result(float(1e3 * rms(fit.residual)[0]), "per mille")}
+    results = ellipsoid(fit) | {"field-total": result(strength)}
     if doubt := fields.field_doubt(fit):
         remedy = "move away from it and repeat the run, or leave out the pose with `rig exclude`"
         return results | {"uncertainty": Missing(f"{doubt}; {remedy}")}
@@ -96,9 +90,7 @@ def hand_turns(measured: MeasuredRun) -> dict[str, Result | Missing]:
     The uncertainty is Missing if it is above 1.2 times the setting target_percent: the run ended at most_positions.
     """
     fit = turns.fit_turns(measured.table())
-    results = {f"gyro-bias-{e.axis}": result(e) for e in fit.model.estimates("gyro-bias")}
-    results |= {f"gyro-scale-{e.axis}": result(e) for e in fit.model.estimates("gyro-scale-factor")}
-    results |= {f"gyro-misalignment-{e.name}": result(e) for e in fit.model.estimates("gyro-misalignment")}
+    results = gyroscope(fit)
     results |= {"turn-residual": Result(float(rms(fit.residual)[:2].max()), "deg/s")}
     worst, parameter = turns.largest_uncertainty(fit)
     known = f"{parameter} is known to {100 * worst:.2g} % only"

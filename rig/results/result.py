@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 from calibrations.criteria import COVERAGE_FACTOR
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit, fit
+from calibrations.means.noise import rms
 from calibrations.model import Estimate
 from calibrations.model.file import read_model
 from calibrations.table import Table
@@ -102,7 +103,13 @@ def documents(results: Mapping[str, Result], limits: Mapping[str, Limit]) -> dic
     }
 
 
-# Parameters of a fitted model as results, for magnetometers and gyroscopes.
+# Parameters of a fitted model as results.
+
+SHORT_NAMES = {  # of effects in results
+    "scale-factor": "scale",
+    "gyro-scale-factor": "gyro-scale",
+    "axis-nonorthogonality": "nonorthogonality",
+}
 
 
 def fit_shipped(table: Table, model: str, *effect_names: str) -> Fit:
@@ -112,6 +119,26 @@ def fit_shipped(table: Table, model: str, *effect_names: str) -> Fit:
         if effects[name].excluded(table) is None:
             start = start.with_effect(effects[name])
     return fit(start, table)
+
+
+def estimates(fit: Fit, *effects: str) -> dict[str, Result | Missing]:
+    """The parameters of effects by the effect and the axis, or the pair of axes: `hard-iron-x`, `soft-iron-xy`."""
+    return {
+        f"{SHORT_NAMES.get(effect, effect)}-{estimate.axis or estimate.name}": result(estimate)
+        for effect in effects
+        for estimate in fit.model.estimates(effect)
+    }
+
+
+def gyroscope(fit: Fit) -> dict[str, Result | Missing]:
+    """Bias, scale factor and misalignment of a gyroscope."""
+    return estimates(fit, "gyro-bias", "gyro-scale-factor", "gyro-misalignment")
+
+
+def ellipsoid(fit: Fit) -> dict[str, Result | Missing]:
+    """Hard and soft iron, and the rms residual of the magnitude."""
+    residual = Result(float(1e3 * rms(fit.residual)[0]), "per mille")
+    return estimates(fit, "hard-iron", "soft-iron") | {"left-by-ellipsoid": residual}
 
 
 def result(estimate: Estimate, unit: str | None = None, per: float = 1.0) -> Result | Missing:

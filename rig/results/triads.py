@@ -23,7 +23,7 @@ from procedures.questions import EDGES
 from procedures.session import Pose
 from rig.bench.result_names import SOFT_IRON_PAIRS
 from rig.record.measured import MeasuredRun, sensor_from_base
-from rig.results.result import Missing, Result, evaluates, fit_shipped, result
+from rig.results.result import Missing, Result, ellipsoid, evaluates, fit_shipped, gyroscope, result
 
 AXES = "xyz"
 
@@ -43,10 +43,8 @@ def rate_turn(measured: MeasuredRun) -> dict[str, Result | Missing]:
     """
     table = measured.table()
     fit = fit_shipped(table, "gyroscope", "gyro-misalignment", "gyro-g-sensitivity")
-    results = {f"gyro-bias-{e.axis}": result(e) for e in fit.model.estimates("gyro-bias")}
+    results = gyroscope(fit)
     scales = {e.axis: e for e in fit.model.estimates("gyro-scale-factor")}
-    results |= {f"gyro-scale-{axis}": result(scale) for axis, scale in scales.items()}
-    results |= {f"gyro-misalignment-{e.name}": result(e) for e in fit.model.estimates("gyro-misalignment")}
     residuals = dict(zip(fit.channels, rms(fit.residual), strict=True))
     for axis, scale in scales.items():
         if scale.identified and scale.value:
@@ -116,21 +114,13 @@ def _std(table: Table) -> float:
 
 
 def _missing_results(reason: str) -> dict[str, Result | Missing]:
-    names = (
-        *(f"hard-iron-{axis}" for axis in AXES),
-        *(f"soft-iron-{pair}" for pair in SOFT_IRON_PAIRS),
-        *ELEMENTS.values(),
-    )
-    names = (*names, "left-by-ellipsoid")
-    return {name: Missing(reason) for name in names}
+    iron = (*(f"hard-iron-{axis}" for axis in AXES), *(f"soft-iron-{pair}" for pair in SOFT_IRON_PAIRS))
+    return {name: Missing(reason) for name in (*iron, *ELEMENTS.values(), "left-by-ellipsoid")}
 
 
 def _ellipsoid_results(table: Table, poses: list[Pose]) -> dict[str, Result | Missing]:
     fit = fit_shipped(table, "magnetometer")
-    results = {f"hard-iron-{e.axis}": result(e) for e in fit.model.estimates("hard-iron")}
-    results |= {f"soft-iron-{e.name}": result(e) for e in fit.model.estimates("soft-iron")}
-    results["left-by-ellipsoid"] = Result(float(1e3 * rms(fit.residual)[0]), "per mille")
-    return results | _elements(fit, table, poses)
+    return ellipsoid(fit) | _elements(fit, table, poses)
 
 
 def _elements(fit: Fit, table: Table, poses: list[Pose]) -> dict[str, Result | Missing]:
