@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -62,6 +62,15 @@ class CalibratedBatch:
         """For each sensor, whether its residual is more than noise, so that the model does not describe it."""
         usual = [look.excess for look in self.looks]
         return tuple(stands_out(look, usual) for look in self.looks)
+
+    @property
+    def gains(self) -> Array:
+        """For each parameter, the median ratio of its standard uncertainty to that of a sensor fitted alone."""
+        return np.asarray(np.median(self.pooled.stds / self.pooled.alone, axis=0))
+
+    def marked(self, marks: Iterable[bool]) -> list[str]:
+        """The names of the sensors with a mark; one mark for each sensor."""
+        return [member.sensor for member, mark in zip(self.members, marks, strict=True) if mark]
 
 
 @dataclass(frozen=True)

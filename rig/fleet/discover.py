@@ -68,7 +68,7 @@ class Stand:
         effects = tuple(effect.effect for effect in self.effects.get(member.batch, ()))
         return replace(self.start, what=kind, effects=effects, errors=errors_of(self.errors, member.rig))
 
-    def judge_with_siblings(self, batch: str, effects: tuple[BatchEffect, ...]) -> Stand:
+    def with_effects(self, batch: str, effects: tuple[BatchEffect, ...]) -> Stand:
         """This state with other effects of a batch."""
         return replace(self, effects={**self.effects, batch: effects})
 
@@ -125,7 +125,7 @@ def _add_missing_effects(fleet: Fleet, stand: Stand, batches: Batches) -> Stand:
         stand, missing = _judge_batches(fleet, stand, open_, step)
         open_ = {batch: batches[batch] for batch, effects in missing.items() if effects and rounds_left}
         for batch in open_:
-            stand = stand.judge_with_siblings(batch, (*stand.effects.get(batch, ()), missing[batch][0]))
+            stand = stand.with_effects(batch, (*stand.effects.get(batch, ()), missing[batch][0]))
     return stand
 
 
@@ -166,9 +166,9 @@ def _drop_needless_effects(fleet: Fleet, stand: Stand, batch: str, members: Sequ
     tested = _test_jointly(fleet, stand, batch, members)
     significant = tuple(effect for effect in tested if effect is not None)
     if len(significant) == len(tested):
-        return stand.judge_with_siblings(batch, significant)
+        return stand.with_effects(batch, significant)
     k, effects = tested.index(None), stand.effects[batch]
-    reduced = stand.judge_with_siblings(batch, (*effects[:k], *effects[k + 1 :]))
+    reduced = stand.with_effects(batch, (*effects[:k], *effects[k + 1 :]))
     fewer, _ = _judge_batches(fleet, reduced, {batch: members}, f"batch {batch}: leaving out {effects[k].effect}")
     return _drop_needless_effects(fleet, fewer, batch, members) if len(effects) > 2 else fewer
 
@@ -178,7 +178,7 @@ def _test_jointly(fleet: Fleet, stand: Stand, batch: str, members: Sequence[Memb
     effects = stand.effects[batch]
     tested = []
     for k, effect in enumerate(effects):
-        reduced = stand.judge_with_siblings(batch, (*effects[:k], *effects[k + 1 :]))
+        reduced = stand.with_effects(batch, (*effects[:k], *effects[k + 1 :]))
         step = f"batch {batch}: testing the need of {effect.effect}"
         missed = _judge_batches(fleet, reduced, {batch: members}, step)[1].get(batch, [])
         tested.append(next((candidate for candidate in missed if candidate.effect == effect.effect), None))

@@ -74,7 +74,7 @@ def _batch(batch: CalibratedBatch) -> Document:
             "spread": parameter.spread * size,
             "spread_interval": (parameter.spread_interval(0.025, 0.975) * size).tolist(),
             "pooled": parameter.pooled,
-            "apart": [m.sensor for m, is_outlier in zip(batch.members, parameter.outliers, strict=True) if is_outlier],
+            "apart": batch.marked(parameter.outliers),
         }
         for name, parameter, size in zip(batch.names, batch.pooled.parameters, scale, strict=True)
     ]
@@ -157,7 +157,6 @@ def _spread(batch: CalibratedBatch, k: int) -> Spread:
 
 
 def _rows(batch: CalibratedBatch) -> list[tuple[object, ...]]:
-    gains = np.median(batch.pooled.stds / batch.pooled.alone, axis=0)
     return [
         (
             batch.batch or "no batch",
@@ -166,10 +165,9 @@ def _rows(batch: CalibratedBatch) -> list[tuple[object, ...]]:
             estimate_text(parameter.mean * size, parameter.mean_std * size),
             rounded(parameter.spread * size, 2),
             rounded(float(gain), 2),
-            ", ".join(m.sensor for m, is_outlier in zip(batch.members, parameter.outliers, strict=True) if is_outlier)
-            or "-",
+            ", ".join(batch.marked(parameter.outliers)) or "-",
         )
         for name, parameter, size, gain in zip(
-            batch.names, batch.pooled.parameters, batch.pooled.scale, gains, strict=True
+            batch.names, batch.pooled.parameters, batch.pooled.scale, batch.gains, strict=True
         )
     ]

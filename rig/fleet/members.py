@@ -14,9 +14,10 @@ from __future__ import annotations
 import csv
 import hashlib
 import io
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from calibrations.errors import DataError
 from calibrations.files import open_text_file
@@ -153,7 +154,7 @@ def _constant(line: str) -> tuple[str, str, str]:
     return line[1:].partition(":") if line.startswith("#") else ("", "", "")
 
 
-def _run_members(name: str, given_names: dict[str, str]) -> Iterator[Member]:
+def _run_members(name: str, given_names: Mapping[str, Any]) -> Iterator[Member]:
     """The sensors of a run, or the named sensor. Raises UnknownRun."""
     run_id, slash, sensor_name = name.partition("/")
     if not run_id:
@@ -167,13 +168,7 @@ def _run_members(name: str, given_names: dict[str, str]) -> Iterator[Member]:
     selected = [member for member in sensors if not slash or member.data == f"{run.run}/{sensor_name}"]
     if not selected:
         raise UnknownRun(f"run {run_id} has no sensor {sensor_name!r}; it has {', '.join(m.data for m in sensors)}")
-    for m in selected:
-        yield replace(
-            m,
-            sensor=given_names.get("sensor", m.sensor),
-            batch=given_names.get("batch", m.batch),
-            rig=given_names.get("rig", m.rig),
-        )
+    yield from (replace(member, **given_names) for member in selected)
 
 
 def _record_members() -> Iterator[Member]:

@@ -228,26 +228,19 @@ def calibration(result: Calibration) -> Iterator[str]:
 
 
 def _batch(batch: CalibratedBatch) -> Iterator[str]:
-    unlike_model = [m.sensor for m, unlike in zip(batch.members, batch.unlike, strict=True) if unlike]
     yield f"batch {batch.batch or '-'}: {len(batch.members)} sensors"
     rows = []
     for (effect, name, axis, unit), parameter, size, gain in zip(
-        batch.names, batch.pooled.parameters, batch.pooled.scale, _gains(batch), strict=True
+        batch.names, batch.pooled.parameters, batch.pooled.scale, batch.gains, strict=True
     ):
         mean = concise(parameter.mean * size, parameter.mean_std * size, unit)
-        outliers = [m.sensor for m, is_outlier in zip(batch.members, parameter.outliers, strict=True) if is_outlier]
         spread = f"{parameter.spread * size:.2g} {unit}"
-        rows.append((effect, name, axis or "-", mean, spread, f"{gain:.2f}", _sensor_list(outliers)))
+        outliers = _sensor_list(batch.marked(parameter.outliers))
+        rows.append((effect, name, axis or "-", mean, spread, f"{gain:.2f}", outliers))
     yield columns(("effect", "parameter", "axis", "mean", "spread", "std / alone", "outliers"), rows)
-    if unlike_model:
-        names = _sensor_list(unlike_model)
+    if any(batch.unlike):
+        names = _sensor_list(batch.marked(batch.unlike))
         yield f"This model does not describe: {names}; `rig fleet discover` finds their missing effects."
-
-
-def _gains(batch: CalibratedBatch) -> list[float]:
-    import numpy as np
-
-    return list(map(float, np.median(batch.pooled.stds / batch.pooled.alone, axis=0)))
 
 
 def _sensor_list(sensors: list[str]) -> str:
