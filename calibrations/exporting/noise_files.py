@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from calibrations.errors import ModelError
 from calibrations.exporting.linear_form import unit_factor
-from calibrations.exporting.simulated import ExportedFile, Loss
+from calibrations.exporting.simulated import ExportedFile, Loss, gravity_of
 from calibrations.model import Model
 from calibrations.table import STANDARD_GRAVITY
 
@@ -114,11 +114,7 @@ def _sensor(model: Model) -> str:
 
 
 def _factor(model: Model, sensor: str) -> float:
-    gravity = model.provenance.get("gravity_m_s2")
-    factor = unit_factor(
-        model.unit, SENSORS[sensor][0], float(gravity) if isinstance(gravity, (int, float)) else STANDARD_GRAVITY
-    )
-    return factor or 1.0
+    return unit_factor(model.unit, SENSORS[sensor][0], gravity_of(model)) or 1.0
 
 
 def _largest_value(model: Model, effect: str) -> float:

@@ -82,9 +82,14 @@ class SimulatedSensor:
 
     @property
     def gravity_m_s2(self) -> float:
-        """Local gravity of the calibration; standard gravity where the model file does not give it."""
-        gravity = self.model.provenance.get("gravity_m_s2")
-        return float(gravity) if isinstance(gravity, (int, float)) else STANDARD_GRAVITY
+        """Local gravity of the calibration."""
+        return gravity_of(self.model)
+
+
+def gravity_of(model: Model) -> float:
+    """Local gravity of a model's calibration, m/s^2; standard gravity where the model file does not give it."""
+    gravity = model.provenance.get("gravity_m_s2")
+    return float(gravity) if isinstance(gravity, (int, float)) else STANDARD_GRAVITY
 
 
 def simulate(

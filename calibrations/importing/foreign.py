@@ -110,9 +110,10 @@ def _import_with(
         raise MissingColumn(f"{laid.place}: {reason}") from None
     merged = {**laid.constants, **constants}
     names = {*(m.name for m in mapping), *unmapped}
-    merged |= (
-        _still_units(mapping, names, laid.name) if kind == "still" else _output_unit(mapping, kind, merged, laid.name)
-    )
+    if kind == "still":
+        merged |= _still_units(mapping, names, laid.name)
+    else:
+        merged |= _output_unit(mapping, kind, merged, laid.name)
     mapped_names = {m.file_column for m in mapping}
     path = next((m.file_column for m in mapping if m.name == PATH), PATH)
     first = zip(laid.header, laid.sample[0], strict=True)
@@ -261,11 +262,14 @@ def _output_unit(
     """The unit of the three output axes, where one is given: the magnetometer's with `triad: m` or without an
     accelerometer. Raises DataError if the axes have different units.
     """
-    accelerometer = any(m.name == "ax" for m in mapped)
-    field = constants.get("triad") == "m"
-    for axes in (
-        (RATES,) if kind in ("rates", "turns") else TRIADS[1:] if field else TRIADS[:1] if accelerometer else TRIADS
-    ):
+    candidates: Sequence[Sequence[str]] = TRIADS
+    if kind in ("rates", "turns"):
+        candidates = (RATES,)
+    elif constants.get("triad") == "m":
+        candidates = TRIADS[1:]
+    elif any(m.name == "ax" for m in mapped):
+        candidates = TRIADS[:1]
+    for axes in candidates:
         if unit := _unit_of_axes(mapped, axes, source):
             return {"unit": unit}
     return {}

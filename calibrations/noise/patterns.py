@@ -40,10 +40,10 @@ PLAYS = (0.03, 0.1, 0.3)  # widths of a hysteresis that are tried, of the range 
 class Pattern:
     """A part of one channel's means that is not noise: a form (m,), its amount, and how uncertain that is.
 
-    `make` computes the form, which few patterns need. `words` has a place for the amount. `gain`: twice the
-    log-likelihood; `price`: of its search. `cause` is the logged
-    column that it follows; `rivals` are the other patterns that explain as much. `doubt`: how uncertain the form leaves
-    the amount, of the amount.
+    `make` computes the form, which few patterns need. `words` has a place for the amount. `gain` is twice the gain in
+    log-likelihood, `price` that of the search for it. `cause` is the logged column that it follows; `rivals` are the
+    other patterns that explain as much. `doubt` is the uncertainty of the amount that comes from its form, as a share
+    of the amount.
     """
 
     kind: str
@@ -89,10 +89,9 @@ class Pattern:
     @property
     def text(self) -> str:
         """The pattern in words, with the patterns that the record cannot separate from it."""
-        names_of_rivals = " or ".join(rival.plain for rival in self.rivals)
-        return (
-            f"{self.plain} (this record cannot separate it from {names_of_rivals})" if names_of_rivals else self.plain
-        )
+        if not self.rivals:
+            return self.plain
+        return f"{self.plain} (this record cannot separate it from {' or '.join(rival.plain for rival in self.rivals)})"
 
     def remove_from(self, channel: Channel) -> Channel:
         """The record without it."""

@@ -37,7 +37,9 @@ TRIADS = {  # kinds of packets -> their outputs
     xbus.RATE_HR: RATES,
     xbus.FIELD: FIELDS,
 }
-NAMES = {xbus.ACCELERATION: "Acceleration", xbus.ACCELERATION_HR: "AccelerationHR"} | {
+NAMES = {
+    xbus.ACCELERATION: "Acceleration",
+    xbus.ACCELERATION_HR: "AccelerationHR",
     xbus.RATE: "RateOfTurn",
     xbus.RATE_HR: "RateOfTurnHR",
     xbus.FIELD: "MagneticField",

@@ -32,7 +32,11 @@ FLOAT32, FIXED_12_20, FIXED_16_32, FLOAT64 = range(4)
 WIDTHS = {FLOAT32: 4, FIXED_12_20: 4, FIXED_16_32: 6, FLOAT64: 8}
 LONGEST = 2048  # bytes of data
 CLIPPED = 8  # bit of the status word for the first output; the others follow
-ERRORS = {3: "invalid period", 4: "invalid message", 30: "timer overflow", 32: "invalid baud rate"} | {
+ERRORS = {
+    3: "invalid period",
+    4: "invalid message",
+    30: "timer overflow",
+    32: "invalid baud rate",
     33: "invalid parameter",
     40: "device error",
     41: "more data than the baud rate allows",

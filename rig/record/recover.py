@@ -169,9 +169,8 @@ def _mend_runs(connection: Connection) -> Iterator[str]:
             connection.execute(update(runs).where(runs.c.run == row.run).values(mended))
             yield f"run {row.run}: {lost_values}"
     numbers = union(*[select(table.c.run) for table in (poses, blocks, readings)]).subquery()
-    for run in (
-        connection.execute(select(numbers.c.run).where(numbers.c.run.not_in(select(runs.c.run)))).scalars().all()
-    ):
+    without_entry = select(numbers.c.run).where(numbers.c.run.not_in(select(runs.c.run)))
+    for run in connection.execute(without_entry).scalars().all():
         documents: dict[str, Any] = {name: {} for name in ("settings", "bench", "identities", "constants", "results")}
         procedure = (*run.split("-"), "", "", "unknown")[2] or "unknown"
         connection.execute(insert(runs), {
@@ -273,9 +272,7 @@ def rewrite_schema(path: Path) -> None:
 
 
 _SCHEMA = 100  # where the schema begins in the first page, after the header of the file
-_EMPTY_PAGE = struct.Struct(
-    ">B H H H B"
-)  # a leaf of a table: its type, free block, cells, start of the cells, fragments
+_EMPTY_PAGE = struct.Struct(">B H H H B")  # a table's leaf: type, free block, cells, start of the cells, fragments
 
 
 def _clear_schema(path: Path) -> tuple[dict[str, int], int]:

@@ -64,8 +64,8 @@ def calibrating(runs: Iterable[Run]) -> dict[str, list[Run]]:
     return by_sensor
 
 
-def lives(run: Run, runs: Iterable[Run]) -> dict[str, int]:
-    """How many calibrating runs there are of each sensor of `run`, where more than one."""
+def calibration_counts(run: Run, runs: Iterable[Run]) -> dict[str, int]:
+    """The number of calibrating runs of each sensor of `run` that has more than one."""
     runs_by_sensor = calibrating(runs)
     counts = {sensor: len(runs_by_sensor.get(sensor, ())) for sensor in members(run)}
     return {sensor: count for sensor, count in counts.items() if count > 1}

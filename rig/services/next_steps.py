@@ -108,7 +108,7 @@ def _commands(run: Run) -> Iterator[str]:
     elif run.procedure == "check-standard":
         yield "Next: rig control"
     elif run.rows and run.kind in FITTED_KINDS:
-        data = f"{run.run}/{next(iter(sensors))}" if (sensors := run.bench.get("sensors")) else run.run
+        data = run.data[0]
         if run.procedure == "soak":
             yield f"Next: rig report {data} --out night.html"
             return

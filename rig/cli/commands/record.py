@@ -33,7 +33,7 @@ Ranges = Mapping[str, tuple[float, float]]
 @json_option
 def show_command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
     """Show the settings, events and results of RUN, and the range of each column."""
-    from rig.services.history import lives  # loads the fit
+    from rig.services.history import calibration_counts  # loads the fit
 
     with working(f"reading {run}"), Record.to_find(run) as record:
         run_row = record.run(run)
@@ -43,7 +43,7 @@ def show_command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
         ranges = _ranges(record, run_row)
         listed = _poses(record, run_row) if poses else None
         lines = record.lines(run) if wants_log else []
-        run_counts = lives(run_row, record.runs())
+        run_counts = calibration_counts(run_row, record.runs())
     if as_json:
         details = ({"kept": listed} if poses else {}) | ({"log": [vars(line) for line in lines]} if wants_log else {})
         emit(_run_document(run_row, events, ranges) | details)

@@ -21,7 +21,7 @@ from rig.record.tables import units_of
 from rig.services.charts import Course, RunTime, course_chart, kind_of
 from rig.services.exclusion import exclude, find_numbered_run
 from rig.services.export import export
-from rig.services.history import lives, type_of
+from rig.services.history import calibration_counts, type_of
 from rig.services.next_steps import page_steps, result_rows
 from rig.services.page_words import page_step
 from rig.services.request import Request
@@ -218,7 +218,7 @@ def register(desk: Desk) -> None:
             try:
                 with Record.to_find(run) as record:
                     recorded_run, excluded = record.run(run), record.excluded(run)
-                    run_counts = lives(recorded_run, record.runs())
+                    run_counts = calibration_counts(recorded_run, record.runs())
             except Exception as error:
                 show_error("There is no such run", error)
                 ui.link("All runs", "/record")
