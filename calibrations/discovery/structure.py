@@ -186,12 +186,16 @@ def poorly_predicted(fit: Fit) -> Pattern | None:
     Effects can fit each of a few stretches alone. Of poses, the generalised cross-validation has to show it as well: a
     large error on unseen poses may be that of one pose, which alone determines a parameter.
     """
-    if fit.table.type.moving:
-        rows, is_poor = "stretches", fit.held_out_excess > MOST_UNSEEN
+    seen = max(fit.pooled_excess, 1.0)
+    if fit.table.type.moving and fit.held_out_excess > MOST_UNSEEN:
+        rows = "stretches"
+    elif (
+        fit.table.type.stage_angles
+        and fit.cross_validated_excess > MATERIAL * seen
+        and fit.held_out_excess > MOST_UNSEEN * seen
+    ):
+        rows = "poses"
     else:
-        rows, seen = "poses", max(fit.pooled_excess, 1.0)
-        is_poor = fit.cross_validated_excess > MATERIAL * seen and fit.held_out_excess > MOST_UNSEEN * seen
-    if not is_poor:
         return None
     text = f"the error on unseen {rows} is {fit.held_out_excess:.2g} times the noise floor"
     return Pattern(text, np.zeros((0, 0, 0)))
