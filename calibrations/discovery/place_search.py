@@ -21,7 +21,7 @@ from calibrations.discovery.search import first_order_cost
 from calibrations.discovery.significance import chance
 from calibrations.discovery.structural import StructuralSearch, fit_each_axis
 from calibrations.effects import Effect
-from calibrations.fitting.determined import lets_go
+from calibrations.fitting.determined import loses_parameters
 from calibrations.fitting.fit import Fit, refit
 from calibrations.fitting.noise_fit import deviance
 from calibrations.fitting.shown_forms import Shown, forms_at
@@ -71,7 +71,7 @@ def search_places(start: Fit, effects: Mapping[str, Effect]) -> StructuralSearch
     if acting is None or not acting.by_place:
         return None
     present = refit(base, reduce(Model.with_effect, acting.effects, base.model))
-    if lets_go(start, present) or not _score(present) > _score(start) + PATTERN_BETTER:
+    if loses_parameters(start, present) or not _score(present) > _score(start) + PATTERN_BETTER:
         return None  # slow noise, or scatter, explains the residual as well
     report("fitting the effects and curves that were found")
     places = [_Place(name, acting.gain(name), rivals=tuple(acting.rivals(name))) for name in acting.by_place]
@@ -207,7 +207,7 @@ def _name(place: _Place, present: Fit, effects: Mapping[str, Effect]) -> tuple[F
             ranked = [c for c in ranked if place_of_effect(c.name) == place.name]
             ranked = [c for c in ranked if not any(_is_nested(c.effect, other.effect) for other, _ in chosen)]
         trials = [(c, refit_with(best, c)) for c in _worth_a_fit(ranked, place.name)]
-        trials = [(c, trial) for c, trial in trials if not lets_go(best, trial)]
+        trials = [(c, trial) for c, trial in trials if not loses_parameters(best, trial)]
         complete = [(c, trial) for c, trial in trials if _is_complete(trial, present, place.name)]
         if complete:
             last, end = _likeliest(complete, present)

@@ -30,7 +30,7 @@ from calibrations.criteria import (
 from calibrations.discovery.candidates import RowCandidate, best_pair, candidates, refit_with, with_rivals
 from calibrations.discovery.significance import chance, likelihood
 from calibrations.effects import Effect
-from calibrations.fitting.determined import lets_go
+from calibrations.fitting.determined import loses_parameters
 from calibrations.fitting.fit import Fit, refit
 from calibrations.means.noise import rms
 
@@ -154,7 +154,7 @@ def _next(present: Fit, ranked: list[RowCandidate]) -> ForwardStep | None:
         if c.p_value >= SIGNIFICANT or _explained_share(present, c.excess_after) < LEAST_SHARE / 2:
             continue
         step = _forward_step(present, ranked, c)
-        if lets_go(present, step.after):
+        if loses_parameters(present, step.after):
             continue
         if (
             step.held_out_after < step.held_out_before
@@ -234,7 +234,7 @@ def _drop_needless(present: Fit, names: tuple[str, ...], freed: set[str]) -> tup
         name = min(costs, key=lambda n: costs[n][0] / max(costs[n][1], 1))
         reduced = _refit_without(present, name)
         is_needed = chance(*costs[name]) < SIGNIFICANT and reduced.held_out_excess > present.held_out_excess
-        if is_needed or lets_go(present, reduced):
+        if is_needed or loses_parameters(present, reduced):
             break
         names = tuple(n for n in names if n != name)
         present = reduced
@@ -264,7 +264,7 @@ def _first_exchange(
             exchanged_names = tuple(c.name if n == name else n for n in names)
             if present - CLEARLY_BETTER < likelihood(exchanged) <= present + CLEARLY_BETTER and c.name != name:
                 exchanged, exchanged_names = _drop_needless(exchanged, exchanged_names, freed)
-            if likelihood(exchanged) > present + CLEARLY_BETTER and not lets_go(end, exchanged):
+            if likelihood(exchanged) > present + CLEARLY_BETTER and not loses_parameters(end, exchanged):
                 return exchanged, exchanged_names
     return None
 

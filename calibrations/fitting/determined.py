@@ -77,7 +77,7 @@ def _warn_of_unchecked_rows(fit: Fit, lone: NDArray[np.bool_]) -> str:
     )
 
 
-def lets_go(smaller: Fit, larger: Fit) -> bool:
+def loses_parameters(smaller: Fit, larger: Fit) -> bool:
     """Whether a parameter that `smaller` determines is undetermined in `larger`: for positions of unknown orientation.
 
     With enough nonlinearity, or with a far too large scale factor, a model can give every output the same magnitude;

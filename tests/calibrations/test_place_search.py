@@ -14,7 +14,7 @@ from calibrations.discovery.results import Discovery
 from calibrations.discovery.verdict import Verdict
 from calibrations.documents import places_document
 from calibrations.effects.catalogue import catalogue
-from calibrations.fitting.determined import lets_go
+from calibrations.fitting.determined import loses_parameters
 from calibrations.fitting.fit import Fit, fit
 from calibrations.loop import discover
 from calibrations.model.file import read_model
@@ -124,8 +124,8 @@ def test_positions_that_all_have_one_force_are_no_calibration() -> None:
     theta[[1, 3, 4, 5]] = -1e7, 1e4, 1e7, 1e4  # bias y, scale factors: every force is (0, 1, 0)
     wrong = replace(right, theta=theta, residual=right.problem.residual(theta))
     assert wrong.pooled_excess < 1.5
-    assert lets_go(right, wrong)
-    assert not lets_go(right, right)
+    assert loses_parameters(right, wrong)
+    assert not loses_parameters(right, right)
 
 
 def test_geometry_is_named_beside_a_cause() -> None:
