@@ -204,7 +204,7 @@ def test_a_supply_is_coarse_where_noise_does_not_smooth_its_steps(noise_v: float
         (("still.npy", "--rate", "50", "--tau", "100"), "an averaging time of 100 s needs a record of 200 s or more"),
         (("still.npy", "--rate", "50", "--tau", "0.001"), "is shorter than one sample, 0.02 s"),
         (("rate.csv",), "the stated rate is 100 samples a second, the column t_s gives 50"),
-        (("uneven.csv",), "s; samples must be evenly spaced: record again with every sample"),
+        (("uneven.csv",), "s; samples must be evenly spaced: record again with evenly spaced samples"),
         (("means.csv",), "a row is the mean of 500 samples (column n), as in poses"),
         (("one-constant.csv",), "channel vx_v (--channel takes another: vy_v): every sample is the same"),
         (("torn.csv",), "1 gaps, 200 s in total, and 119.98 s of samples; the longest, of 200 s, is at t = 19.98 s"),

@@ -188,7 +188,7 @@ def test_bad_still_records_give_one_message(rig: Rig, folder: Path, command: str
     for data, says in {
         "nan.csv": "nan",
         "gap.csv": "analyse the parts between the gaps separately",
-        "late.csv": "samples must be evenly spaced: record again with every sample",
+        "late.csv": "samples must be evenly spaced: record again with evenly spaced samples",
         "rate.csv": "the stated rate is 100 samples a second, the column t_s gives 10; correct one",
         "constant.csv": "every sample is the same; check that the sensor is connected",
         "clipped.csv": "the channel is clipped; choose a wider range",
