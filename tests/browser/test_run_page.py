@@ -263,7 +263,7 @@ def test_a_run_without_poses_is_made_by_keyboard_and_leads_to_its_results(workbe
     phase(page, "complete")
     expect(page.get_by_role("button", name="Download: Run over time")).to_be_hidden()  # there is no picture
     page.get_by_role("button", name="Open the results").click()
-    expect(page.get_by_text("Tilt of the table along this axis of the level.").first).to_be_visible()
+    expect(page.get_by_text("Tilt of the table along this axis of the level, axis x")).to_be_visible()
 
 
 def test_a_bench_is_chosen_before_a_run_and_stays_during_it(workbench: Workbench) -> None:

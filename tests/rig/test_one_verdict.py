@@ -153,7 +153,7 @@ def agree(answers: Answers) -> None:
 
     # a comparison fails where effects are missing, unless its own residual is the only measure of the noise
     comparison = answers.document("compare")
-    assert bool(comparison["fails"]) or not first.missing or getattr(first.fit, "residual_is_noise", False)
+    assert bool(comparison["fails"]) or not first.missing or not first.findings.data.is_noise_known(first.fit)
     assert comparison["rmse"].keys() == comparison["noise_floor"].keys()
 
 
