@@ -86,7 +86,7 @@ class SlowAdc(Adc):
 
 
 def hand_session(world: HandheldWorld, dwells: tuple[Dwell, ...] = ()) -> tuple[Session, Book]:
-    """A session in which a hand turns the sensor, and what it records."""
+    """A simulated session in which a person turns the sensor by hand, and the book that keeps its data."""
     rig, book = session(world, dwells=dwells)
     return replace(rig, adc=SlowAdc(world), by_hand=HandAnalysis()), book
 

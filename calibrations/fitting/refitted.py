@@ -9,13 +9,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrations.fitting.minimise import newton_step
+from calibrations.fitting.minimise import SMALL_GAIN, newton_step
 from calibrations.fitting.problem import Problem
 from calibrations.means.noise import Noise, rms
 from calibrations.table import Array
 
 STEPS = 4
-SMALL_GAIN = 3e-3  # of the mean square of the residual or the noise
 
 
 def unseen_error(problem: Problem, noise: Noise, theta: Array, jacobian: Array, fold: NDArray[np.intp]) -> float:

@@ -8,7 +8,7 @@ our names needs no mapping, for any separator; units in it are used.
 from __future__ import annotations
 
 import csv
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -30,14 +30,10 @@ from calibrations.importing.plausible import (
 from calibrations.importing.raw_logs import is_raw_log
 from calibrations.importing.sessions import RATE, TURN, is_session, is_whole_turn_log, sample_rates
 from calibrations.importing.sheet import Sheet, look_like_names, read_cells, read_sheet
-from calibrations.importing.units import UNITS, ColumnMapping, column_unit
+from calibrations.importing.units import RATES, TRIADS, UNITS, ColumnMapping, column_unit, output_unit, still_units
 from calibrations.table import NUMBERS, Array, Constant, Table, guess_kind
 from calibrations.tables import FILE_KINDS, TURN_MARKS
 
-TRIADS = (("ax", "ay", "az"), ("mx", "my", "mz"))
-RATES = ("gx", "gy", "gz")
-SENSORS = (TRIADS[0], RATES, TRIADS[1])
-UNIT_OF = "unit_"  # before the letter of a sensor: a constant with its unit, where it differs from that of the first
 PATH = "path"
 
 
@@ -111,9 +107,9 @@ def _import_with(
     merged = {**laid.constants, **constants}
     names = {*(m.name for m in mapping), *unmapped}
     if kind == "still":
-        merged |= _still_units(mapping, names, laid.name)
+        merged |= still_units(mapping, names, laid.name)
     else:
-        merged |= _output_unit(mapping, kind, merged, laid.name)
+        merged |= output_unit(mapping, kind, merged, laid.name)
     mapped_names = {m.file_column for m in mapping}
     path = next((m.file_column for m in mapping if m.name == PATH), PATH)
     first = zip(laid.header, laid.sample[0], strict=True)
@@ -254,45 +250,6 @@ def _check_clock(table: Table, laid: Sheet, mapping: Sequence[ColumnMapping]) ->
 def _clock(mapping: Sequence[ColumnMapping]) -> str:
     """The file's name of the time."""
     return next((m.file_column for m in mapping if m.name == "t_s"), "")
-
-
-def _output_unit(
-    mapped: Sequence[ColumnMapping], kind: str, constants: Mapping[str, Constant], source: str
-) -> dict[str, Constant]:
-    """The unit of the three output axes, where one is given: the magnetometer's with `triad: m` or without an
-    accelerometer. Raises DataError if the axes have different units.
-    """
-    candidates: Sequence[Sequence[str]] = TRIADS
-    if kind in ("rates", "turns"):
-        candidates = (RATES,)
-    elif constants.get("triad") == "m":
-        candidates = TRIADS[1:]
-    elif any(m.name == "ax" for m in mapped):
-        candidates = TRIADS[:1]
-    for axes in candidates:
-        if unit := _unit_of_axes(mapped, axes, source):
-            return {"unit": unit}
-    return {}
-
-
-def _still_units(mapped: Sequence[ColumnMapping], names: Collection[str], source: str) -> dict[str, Constant]:
-    """The unit of the first sensor of a still record, and of each other sensor whose unit differs. Raises DataError."""
-    units = {axes[0][0]: _unit_of_axes(mapped, axes, source) for axes in SENSORS if not set(axes).isdisjoint(names)}
-    first = next(iter(units.values()), "")
-    others: dict[str, Constant] = {
-        f"{UNIT_OF}{sensor}": unit or "count" for sensor, unit in units.items() if unit != first
-    }
-    return ({"unit": first} if first else {}) | others
-
-
-def _unit_of_axes(mapped: Sequence[ColumnMapping], axes: Sequence[str], source: str) -> str:
-    """The unit of the axes of one sensor, "" where none is given. Raises DataError for different ones."""
-    stated_units = {m.name: UNITS[m.unit][0] for m in mapped if m.unit}
-    units = {axis: stated_units.get(axis, "") for axis in axes}
-    if len(set(units.values())) > 1:
-        units_of_axes = ", ".join(f"{axis} in {unit or 'no unit'}" for axis, unit in units.items())
-        raise DataError(f"{source}: the three axes must have the same unit: {units_of_axes}")
-    return units[axes[0]]
 
 
 # Rows of a table that a file repeats, and rows whose clock starts again.

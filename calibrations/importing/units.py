@@ -1,15 +1,18 @@
-"""Units of foreign columns and their conversion to V, deg, degC and s; outputs of positions keep their unit."""
+"""Units of foreign columns and their conversion to V, deg, degC and s; outputs of positions keep their unit.
+
+And the unit of a sensor, which its three axes share.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from calibrations.errors import DataError
-from calibrations.table import NUMBERS
+from calibrations.table import NUMBERS, Constant
 
 # unit -> (unit of the target column, factor, offset)
 UNITS: Mapping[str, tuple[str, float, float]] = {
@@ -36,6 +39,10 @@ SPELLINGS = {
     "lsb": "counts", "raw": "counts", "cnt": "counts",
     "°/s": "deg/s", "grad": "deg", "grad/s": "deg/s", "dps": "deg/s", "milli-g": "mg",
 }  # fmt: skip
+TRIADS = (("ax", "ay", "az"), ("mx", "my", "mz"))
+RATES = ("gx", "gy", "gz")
+SENSORS = (TRIADS[0], RATES, TRIADS[1])
+UNIT_OF = "unit_"  # before the letter of a sensor: a constant with its unit, where it differs from that of the first
 _SUFFIX = re.compile(
     r"^(?P<name>.*[^\W_])_(?P<unit>s|ms|us|ns|min|g|mg|mps2|dps|mdps|v|mv|c|degc|degf|deg|rad|ut)$", re.I
 )
@@ -106,3 +113,42 @@ class ColumnMapping:
         if our_name and name.strip() not in NUMBERS:
             raise DataError(f'"{text}": there is no column "{name.strip()}"; did you mean "{our_name}"?')
         return ColumnMapping(name.strip(), column.strip(), unit)
+
+
+def output_unit(
+    mapped: Sequence[ColumnMapping], kind: str, constants: Mapping[str, Constant], source: str
+) -> dict[str, Constant]:
+    """The unit of the three output axes, where one is given: the magnetometer's with `triad: m` or without an
+    accelerometer. Raises DataError if the axes have different units.
+    """
+    candidates: Sequence[Sequence[str]] = TRIADS
+    if kind in ("rates", "turns"):
+        candidates = (RATES,)
+    elif constants.get("triad") == "m":
+        candidates = TRIADS[1:]
+    elif any(m.name == "ax" for m in mapped):
+        candidates = TRIADS[:1]
+    for axes in candidates:
+        if unit := _unit_of_axes(mapped, axes, source):
+            return {"unit": unit}
+    return {}
+
+
+def still_units(mapped: Sequence[ColumnMapping], names: Collection[str], source: str) -> dict[str, Constant]:
+    """The unit of the first sensor of a still record, and of each other sensor whose unit differs. Raises DataError."""
+    units = {axes[0][0]: _unit_of_axes(mapped, axes, source) for axes in SENSORS if not set(axes).isdisjoint(names)}
+    first = next(iter(units.values()), "")
+    others: dict[str, Constant] = {
+        f"{UNIT_OF}{sensor}": unit or "count" for sensor, unit in units.items() if unit != first
+    }
+    return ({"unit": first} if first else {}) | others
+
+
+def _unit_of_axes(mapped: Sequence[ColumnMapping], axes: Sequence[str], source: str) -> str:
+    """The unit of the axes of one sensor, "" where none is given. Raises DataError for different ones."""
+    stated_units = {m.name: UNITS[m.unit][0] for m in mapped if m.unit}
+    units = {axis: stated_units.get(axis, "") for axis in axes}
+    if len(set(units.values())) > 1:
+        units_of_axes = ", ".join(f"{axis} in {unit or 'no unit'}" for axis, unit in units.items())
+        raise DataError(f"{source}: the three axes must have the same unit: {units_of_axes}")
+    return units[axes[0]]

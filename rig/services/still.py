@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.errors import DataError, nearest
-from calibrations.importing.foreign import UNIT_OF
+from calibrations.importing.units import UNIT_OF
 from calibrations.noise.record import Sensed
 from calibrations.noise.samples import hidden_step
 from calibrations.table import AXES, STANDARD_GRAVITY, Array, Table

@@ -85,7 +85,7 @@ def fleet(data: bytes) -> object:
 
 
 def own_procedure(data: bytes) -> object:
-    """A file in a folder of procedures: is it one, and what does it do? It is not run."""
+    """Read a file in the folder of procedures: whether it is a procedure, and its description. It is not run."""
     with TemporaryDirectory(dir=folder()) as place:
         (Path(place) / "mine.py").write_bytes(data)
         found = paths(Path(place)).get("mine")
