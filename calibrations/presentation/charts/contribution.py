@@ -69,7 +69,7 @@ def curves(step: Step[Fit], column: Column, c: int) -> Iterator[tuple[float, Arr
 def is_function(step: Step[Fit], column: Column, c: int) -> bool:
     """Whether the curves of the change over `column` pass through the change of the single rows.
 
-    They may miss them by MISSED of the change's rms, or by the noise floor of one row.
+    They may miss them by LARGEST_MISS of the change's rms, or by the noise floor of one row.
     """
     if column.name == "change" or step.before.table.type.moving:
         return True
