@@ -125,6 +125,14 @@ def certainty_of(c: Candidate) -> str:
     return certainty_text(1 - c.p_value) if c.p_value < SIGNIFICANT else "not significant"
 
 
+def probability_text(c: Candidate) -> str:
+    """The probability of a candidate among all: never 0 or 100 %; a candidate that is not significant has none."""
+    if c.p_value >= SIGNIFICANT:
+        return "-"
+    percent = 100 * c.probability
+    return "> 99.9 %" if percent > 99.9 else "< 0.1 %" if percent < 0.1 else f"{percent:.3g} %"
+
+
 def certainty_text(certainty: float) -> str:
     """A certainty in words: never 100 %."""
     return "> 99.99 %" if certainty > 0.9999 else f"{100 * certainty:.4g} %"

@@ -40,8 +40,9 @@ class ModelSession(Generic[F]):
     """`model` on `data`, and the `steps` taken from there.
 
     `kept` are the data without gross outliers, `start` the fit to them. `effects` are those that may be added, `notes`
-    is the note on the data, `plans` are the searches so far by the effects added before them, and `searching` the
-    threads that make one. Pages on the same data and model share both.
+    is the note on the data, `change` says what has changed since the page was last open. `plans` are the searches so
+    far by the effects added before them, and `searching` the threads that make one. Pages on the same data and model
+    share both.
     `content` is that of data and model when they were read.
     """
 
@@ -56,6 +57,7 @@ class ModelSession(Generic[F]):
     plans: dict[Names, Findings[F]] = field(default_factory=dict, compare=False)
     searching: dict[Names, Thread] = field(default_factory=dict, compare=False, repr=False)
     content: Content = field(default_factory=lambda: Content(""))
+    change: str = ""
 
     @property
     def end(self) -> F:
@@ -252,22 +254,15 @@ def model_session(request: Request) -> ModelSession[Any]:
     )
 
 
-CHANGED = "The data or the model have changed since this page was last open: "
-
-
 def brought_up_to_date(old: ModelSession[Any], new: ModelSession[Any], is_shown: bool = False) -> ModelSession[Any]:
     """The added effects of an old session on `new`, the present data without effects.
 
-    A note names the change, unless its page has shown it already (`is_shown`). An effect that the present data cannot
+    `change` names the change, unless its page has shown it already (`is_shown`). An effect that the present data cannot
     have is left out, with a note.
     """
-    extent_before, extent_now = old.content.extent, new.content.extent
-    notes = [] if is_shown else [f"{CHANGED}{extent_before or 'a file'}, now {extent_now or 'new'}."]
+    extent_before, extent_now = old.content.extent or "a file", new.content.extent or "new"
     new = new.with_effects({**old.effects, **new.effects}).with_added(old.added)
-    return replace(new, notes=(*notes, *new.notes))
-
-
-def without_change(session: ModelSession[F]) -> ModelSession[F]:
-    """The session without the note on a change of its data or model."""
-    notes = tuple(note for note in session.notes if not note.startswith(CHANGED))
-    return session if notes == session.notes else replace(session, notes=notes)
+    if is_shown:
+        return new
+    change = f"The data or the model have changed since this page was last open: {extent_before}, now {extent_now}."
+    return replace(new, change=change)

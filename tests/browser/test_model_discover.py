@@ -55,6 +55,26 @@ def test_all_effects_are_added_at_a_click_and_any_can_be_removed(workbench: Work
     workbench.fits(page)
 
 
+def test_many_added_effects_are_folded_and_the_candidates_stay_in_view(workbench: Workbench, tmp_path: Path) -> None:
+    added = ("axis-misalignment", "quadratic-nonlinearity", "cubic-nonlinearity", "z-axis-bias", "z-axis-scale")
+    page = workbench.context.new_page()
+    page.set_viewport_size(TABLET)
+    chosen = "".join(f"&add={name}" for name in added)
+    page.goto(f"{workbench.origin}/?data={quote(two_faults(tmp_path))}&model=linear{chosen}")
+    title = page.get_by_text("Added: 5 effects")
+    expect(title).to_be_visible()
+    chip = page.get_by_role("button", name="Remove cubic-nonlinearity")
+    expect(chip).to_be_hidden()
+    expect(page.locator(".candidate").first).to_be_in_viewport()
+    workbench.shot(page, "effects-folded")
+    title.click()
+    expect(chip).to_be_visible()
+    chip.click()
+    expect(page.get_by_text("Added:", exact=True)).to_be_visible()
+    expect(page.get_by_role("button", name="Remove z-axis-bias")).to_be_visible()
+    expect(chip).to_have_count(0)
+
+
 def test_every_picture_is_downloaded_as_svg_and_png(workbench: Workbench, tmp_path: Path) -> None:
     page = workbench.visit(f"/?data={quote(two_faults(tmp_path))}")
     expect(page.locator("[aria-label='Residuals'] .points path").first).to_be_attached()

@@ -233,6 +233,23 @@ def test_a_run_begins_after_the_checks_and_no_single_key_moves_anything(workbenc
     page.get_by_role("button", name="Cancel").click()
 
 
+def test_a_run_that_asks_a_person_does_so_after_a_resume(workbench: Workbench) -> None:
+    page = workbench.visit("/run?procedure=sweep&step_deg=180&inclinations_deg=90&face=both")
+    expect(page.get_by_text("Takes", exact=True)).to_be_visible()
+    page.get_by_text("Ask me").click()
+    begin(page)
+    phase(page, "asks you")
+    page.get_by_role("button", name="Stop").first.click()
+    phase(page, "stopped")
+    page.get_by_role("button", name="Resume").click()
+    tick(page)
+    page.get_by_role("dialog").get_by_role("button", name="Begin").click()
+    phase(page, "asks you")
+    expect(page.locator(".question")).to_contain_text("face down")
+    page.get_by_role("button", name="Stop").first.click()
+    phase(page, "stopped")
+
+
 FOCUSED = "document.activeElement.tagName === 'BUTTON' ? document.activeElement.innerText : ''"
 UNTICKED = "document.activeElement.getAttribute('aria-checked') === 'false'"
 

@@ -51,13 +51,13 @@ def test_a_session_of_changed_data_is_made_anew_with_its_effects(run: str) -> No
     again = desk.open(run, "linear")
     assert again.names == ("axis-misalignment",)
     assert again.end.table.n == session.end.table.n - 2
-    assert "have changed" in again.notes[0]
+    assert "have changed" in again.change
     desk.keep(run, "linear", again)
-    assert desk.open(run, "linear").notes == again.notes[1:], "the note is shown once"
+    assert not desk.open(run, "linear").change, "it is shown once"
     with Record() as record:
         exclude(record, run, [5], "a bump")
     desk.updates.add((run, "linear", ""))
-    assert not any("have changed" in note for note in desk.open(run, "linear").notes), "the page has shown it"
+    assert not desk.open(run, "linear").change, "the page has shown it"
 
 
 def test_pages_and_reports_share_the_searches_on_one_model_while_the_data_are_the_same(run: str) -> None:

@@ -17,6 +17,7 @@ from calibrations.criteria import SIGNIFICANT
 from calibrations.design.experiment import Experiment
 from calibrations.discovery.findings import Candidate
 from calibrations.discovery.results import Comparison, Discovery
+from calibrations.discovery.summary import probability_text
 from calibrations.discovery.verdict import refinement_text
 from calibrations.fitting.fit import Fit, in_milli, milli_unit, pool_in_milli
 from calibrations.model import Model, Term
@@ -28,6 +29,7 @@ from calibrations.presentation.formula import formula_html
 from calibrations.presentation.page import html
 from calibrations.presentation.report.motion import motion_page
 from calibrations.presentation.report.parameters import estimate_cells, matrices_section, name_of_file, verdicts
+from calibrations.presentation.views.view import ONLY_ONE
 from calibrations.table import Array
 from calibrations.text import (
     capital,
@@ -111,7 +113,6 @@ def next_takes(e: Experiment) -> str:
 
 MOST_EXPLAINED = 6  # candidates shown with formula and symptom, at most; the others in numbers only
 SHOWS = 1e-3  # share of the noise floor from which on a part of the noise is shown
-SURE = 0.999  # more digits of a probability mean nothing
 NOTICEABLE_BIRGE = 1.05
 HELD_OUT_TEXT = (
     "The ratio of error and noise floor is uncertain: for a complete model it is {chance} on this data (the digits in "
@@ -123,9 +124,9 @@ CANDIDATES = (
     "it; best first. The error of the given model is {seen} × the noise floor; its held-out error is {unseen} ×."
 )
 CHANCES = (
-    "p-value: the probability of so large an improvement anywhere in the search if no effect is missing. Probability: "
-    "relative to the other candidates and to no missing effect, which has the prior probability 1/2 (Schwarz "
-    "criterion). Both are approximate."
+    "p-value: the probability of so large an improvement anywhere in the search if no effect is missing. If only one "
+    "is missing: the probability of a significant candidate, relative to the other candidates and to no missing "
+    "effect, which has the prior probability 1/2 (Schwarz criterion). Both are approximate."
 )
 NO_CANDIDATE = "No effect can be tested on this data: the model already holds every effect that its columns excite."
 PLACES = "Places where the mean residual is not zero; largest first, at most one for each axis and quantity."
@@ -290,7 +291,7 @@ def _candidates(discovery: Discovery[Fit]) -> tuple[Block, ...]:
             rounded(c.excess_after),
             rounded(c.held_out_after),
             probability(c.p_value),
-            _probability(c.probability),
+            probability_text(c),
             ", ".join(c.indistinguishable_from) or "–",
         )
         for c in candidates
@@ -300,7 +301,7 @@ def _candidates(discovery: Discovery[Fit]) -> tuple[Block, ...]:
         for rank, c in enumerate(candidates)
         if rank == 0 or (rank < MOST_EXPLAINED and c.p_value < SIGNIFICANT)
     }
-    head = ("effect", "error / floor", "held-out error / floor", "p-value", "probability", "inseparable from")
+    head = ("effect", "error / floor", "held-out error / floor", "p-value", ONLY_ONE, "inseparable from")
     text = CANDIDATES.format(seen=rounded(start.pooled_excess), unseen=rounded(start.held_out_excess))
     return text, Table("Candidates", head, rows, (1, 2, 3, 4), headed=False, details=explained), Remark(CHANCES)
 
@@ -313,11 +314,6 @@ def _explanation(c: Candidate, output_unit: str) -> tuple[str, ...]:
         Markup('<span class="formula">{}</span>').format(formula),
         Markup("<b>Symptom:</b> {}").format(capital(c.effect.symptom)),
     )
-
-
-def _probability(p: float) -> str:
-    """A probability is approximate: never certain, never impossible."""
-    return f"above {SURE:g}" if p > SURE else f"below {1 - SURE:g}" if p < 1 - SURE else f"{p:.2g}"
 
 
 def _model(discovery: Discovery[Fit]) -> tuple[Block, ...]:

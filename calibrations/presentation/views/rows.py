@@ -14,7 +14,7 @@ from calibrations.discovery.results import Diagnosis, Discovery
 from calibrations.discovery.summary import step_shares
 from calibrations.discovery.verdict import Verdict
 from calibrations.fitting.fit import Fit, milli_unit, pool_in_milli
-from calibrations.presentation.views.view import View, candidate_cells
+from calibrations.presentation.views.view import ONLY_ONE, View, candidate_cells
 from calibrations.text import Cells, milli_amount, quantity, rounded
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ class RowsView(View[Fit]):
         return ("model", "error / floor", self.data.unseen, "share", ""), rows
 
     def candidate_table(self, diagnosis: Diagnosis[Fit], candidates: Sequence[Candidate]) -> Cells:
-        chance = "if it is one of these" if diagnosis.verdict is Verdict.UNEXPLAINED else "probability"
+        chance = "if it is one of these" if diagnosis.verdict is Verdict.UNEXPLAINED else ONLY_ONE
         return candidate_cells(diagnosis, candidates, f"error on {self.data.unseen} / floor", chance)
 
     def fit_chart(self, fit: Fit) -> Chart:

@@ -11,7 +11,7 @@ from calibrations.discovery.findings import Candidate
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
 from calibrations.noise.comparison import compared_deviations, mismatch
 from calibrations.noise.fit import NoiseFit
-from calibrations.presentation.views.view import View, candidate_cells
+from calibrations.presentation.views.view import ONLY_ONE, View, candidate_cells
 from calibrations.text import Cells, quantity, rounded
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ class StillView(View[NoiseFit]):
 
     def candidate_table(self, diagnosis: Diagnosis[NoiseFit], candidates: Sequence[Candidate]) -> Cells:
         error = f"mismatch on {self.data.unseen} / chance"
-        return candidate_cells(diagnosis, candidates, error, "probability", gains=True)
+        return candidate_cells(diagnosis, candidates, error, ONLY_ONE, gains=True)
 
     def fit_chart(self, fit: NoiseFit) -> Chart:
         """Measured and modelled Allan deviations."""

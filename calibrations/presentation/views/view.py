@@ -6,12 +6,16 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Generic
 
+from calibrations.criteria import SIGNIFICANT
 from calibrations.discovery.findings import Candidate, F
 from calibrations.discovery.results import Comparison, Diagnosis, Discovery
+from calibrations.discovery.summary import probability_text
 
 if TYPE_CHECKING:
     from calibrations.presentation.chart import Chart, Picture
     from calibrations.text import Cells
+
+ONLY_ONE = "if only one is missing"  # head of the column of probabilities
 
 
 class View(ABC, Generic[F]):
@@ -39,7 +43,7 @@ class View(ABC, Generic[F]):
 
     @abstractmethod
     def candidate_table(self, diagnosis: Diagnosis[F], candidates: Sequence[Candidate]) -> Cells:
-        """The held-out error, chance and probability of each candidate, as text."""
+        """The held-out error and the probability of each candidate, as text."""
 
     @abstractmethod
     def fit_chart(self, fit: F) -> Chart:
@@ -61,17 +65,21 @@ class View(ABC, Generic[F]):
 def candidate_cells(
     diagnosis: Diagnosis[Any], candidates: Sequence[Candidate], error: str, probability: str, gains: bool = False
 ) -> Cells:
-    """A row for each candidate. `error` and `probability` are heads of columns; `gains`: with the log-likelihoods."""
+    """A row for each candidate. `error` and `probability` are heads of columns; `gains`: with the log-likelihoods.
+
+    Only a significant candidate has a probability: for the others chance is the better explanation. It is relative to
+    the other candidates: of two effects that are both missing, the one that explains less has a small one.
+    """
     rows = [
         (
             c.name,
             f"{diagnosis.held_out_before:.3g} -> {c.held_out_after:.3g}",
             *((f"{c.gain / 2:.4g}" if c.gain > 1e-6 else "0",) if gains else ()),
-            f"{c.p_value:.1g}",
-            f"{c.probability:.3f}",
+            "yes" if c.p_value < SIGNIFICANT else "no",
+            probability_text(c),
             ", ".join(c.indistinguishable_from) or "-",
         )
         for c in candidates
     ]
     gain_head = ("log-likelihood",) if gains else ()
-    return ("candidate", error, *gain_head, "p-value", probability, "cannot be separated from"), rows
+    return ("candidate", error, *gain_head, "significant", probability, "cannot be separated from"), rows

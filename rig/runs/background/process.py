@@ -41,7 +41,7 @@ class Attendant(StatusWriter):
     def __init__(self, order: Order, bench: Bench) -> None:
         super().__init__(order.key, order.procedure, bench)
         self._order = order
-        self.publish()
+        self.publish(attended=order.attended)
 
     def ask(self, question: Question, instead: str | None) -> str:
         """The answer of a person, or of the simulated technician in an unattended run."""

@@ -129,7 +129,8 @@ class Status:
 
     `seat`: where a person answers: a page, the terminal of the run, or nobody: then it cannot pause. `error`: why it is
     paused or not complete. `moving`: instruments that did not stop. `guidance`: keywords of
-    `procedures.session.Guidance`, of a procedure with the sensor in a hand; it has no `attitude`.
+    `procedures.session.Guidance`, of a procedure with the sensor in a hand; it has no `attitude`. `attended`: that of
+    the order.
     """
 
     key: str
@@ -150,6 +151,7 @@ class Status:
     attitude: Mapping[str, Any] = field(default_factory=dict)
     seat: Seat = "page"
     guidance: Mapping[str, Any] = field(default_factory=dict)
+    attended: bool = False
 
     def write(self) -> None:
         """Write the status into its file."""

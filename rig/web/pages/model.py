@@ -154,7 +154,7 @@ class Workbench:
         if session.data.form != "rows":  # the present layout may hold text that a person wrote
             self._lay_out(session.data.form)
         self.chosen.opened(session)
-        for note in session.notes:
+        for note in filter(None, (session.change, *session.notes)):
             with self.notes:
                 show_remark(note, self.data)
         if excluded := run_record.left_out(self.data):

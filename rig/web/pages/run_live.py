@@ -134,7 +134,7 @@ class Live:
             return
 
         async def begin(_sensor: Mapping[str, str], _answers: Mapping[str, str]) -> None:
-            await off_loop(control.go_on, status.run, status.procedure, None, False)
+            await off_loop(control.go_on, status.run, status.procedure, None, status.attended)
             await self.look()
 
         attitude = None if status.guidance else Attitude(**status.attitude) if status.attitude else Attitude()
