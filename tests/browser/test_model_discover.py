@@ -65,7 +65,7 @@ def test_many_added_effects_are_folded_and_the_candidates_stay_in_view(workbench
     expect(title).to_be_visible()
     chip = page.get_by_role("button", name="Remove cubic-nonlinearity")
     expect(chip).to_be_hidden()
-    expect(page.locator(".candidate").first).to_be_in_viewport()
+    expect(page.locator(".card .head").first).to_be_in_viewport()
     workbench.shot(page, "effects-folded")
     title.click()
     expect(chip).to_be_visible()
