@@ -3,7 +3,8 @@
 A knock, a lost packet or a mistyped reading spoils one pose; an effect of the sensor or the rig does not stop between
 one pose and the next. The test compares each pose with the nearest poses in direction of gravity, by medians. If those
 disagree (a loop of hysteresis, an edge, noise), the threshold is higher. A deviation that lasts for some poses in time,
-or repeats at the same pose, is no outlier. A search for effects leaves outliers out, and messages always name them; a
+or repeats at the same pose, is no outlier. If all outliers are the ends of an output, read too small, and chance does
+not explain that, the output may have a limit that no other pose reaches: then they are none either. A search for effects leaves outliers out, and messages always name them; a
 person decides whether to exclude them.
 
 Source  Rousseeuw and Croux, J. Am. Statist. Assoc. 88 (1993), 1273: the median of absolute deviations as a scale.
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from calibrations.criteria import GROSS, MOST_GROSS, SAME_G
+from calibrations.criteria import GROSS, MOST_GROSS, SAME_G, SIGNIFICANT
 from calibrations.fitting.fit import Fit, fit
 from calibrations.geometry.orientation import reported_force
 from calibrations.means.noise import robust_std
@@ -50,7 +51,26 @@ def gross(complete: Fit) -> NDArray[np.intp]:
         ],
         dtype=np.intp,
     )
-    return rows if len(rows) <= MOST_GROSS * table.n else rows[:0]
+    return rows[:0] if len(rows) > MOST_GROSS * table.n or _may_reach_limit(complete, rows) else rows
+
+
+def _may_reach_limit(complete: Fit, rows: NDArray[np.intp]) -> bool:
+    """Whether each row is the largest or smallest expected value of an output, and is measured nearer to the others.
+
+    Of n rows with c outputs, a knock of any sign at any row is such an end with a probability of c/n.
+    """
+    expected = complete.table.outputs.T - complete.residual
+    chance = (len(expected) / complete.table.n) ** len(rows)
+    if not len(rows) or chance >= SIGNIFICANT:
+        return False
+    highest, lowest = np.argmax(expected, axis=1), np.argmin(expected, axis=1)
+    return all(
+        any(
+            (row == highest[k] and complete.residual[k, row] < 0) or (row == lowest[k] and complete.residual[k, row] > 0)
+            for k in range(len(expected))
+        )
+        for row in rows
+    )
 
 
 def _nearest(directions: Array) -> NDArray[np.intp]:

@@ -181,6 +181,17 @@ def test_outliers_are_found_beside_a_missing_effect_of_their_size() -> None:
     assert gross(fit(LINEAR, table)).tolist() == [20, 70]
 
 
+@pytest.mark.parametrize(("sign", "outliers"), [(-1, 0), (1, 2)])
+def test_ends_of_outputs_that_are_read_too_small_are_no_outliers(sign: int, outliers: int) -> None:
+    """A limit of the output that one pose of each axis reaches looks like this; a knock can have either sign."""
+    columns = turns((80, 30, 135), step_deg=7.0)
+    x, y, _ = components(columns)
+    vx, vy = 2.5 + x, 2.5 + y
+    for output in (vx, vy):
+        output[np.argmax(output)] += sign * 60 * NOISE_V
+    assert len(gross(fit(LINEAR, poses(columns, vx, vy)))) == outliers
+
+
 def test_only_a_known_noise_tells_that_nothing_but_noise_is_left() -> None:
     columns = turns((90, 30), step_deg=30.0)
     x, y, _ = components(columns)
