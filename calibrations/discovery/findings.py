@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from calibrations.design.experiment import Experiment
     from calibrations.discovery.dataset import Dataset
     from calibrations.discovery.patterns import Pattern
-    from calibrations.free_forms.naming import ActingPlace
+    from calibrations.free_forms.acting_places import ActingPlace
 
 
 class Measured(Protocol):

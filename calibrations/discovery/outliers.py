@@ -1,11 +1,11 @@
 """Gross outliers: poses whose residual is far from that of all poses around them.
 
 A knock, a lost packet or a mistyped reading spoils one pose; an effect of the sensor or the rig does not stop between
-one pose and the next. The test compares each pose with the nearest poses in direction of gravity, by medians. If those
-disagree (a loop of hysteresis, an edge, noise), the threshold is higher. A deviation that lasts for some poses in time,
-or repeats at the same pose, is no outlier. If all outliers are the ends of an output, read too small, and chance does
-not explain that, the output may have a limit that no other pose reaches: then they are none either. A search for effects leaves outliers out, and messages always name them; a
-person decides whether to exclude them.
+one pose and the next. The test compares each pose with the nearest poses in direction of gravity, by medians. If
+those disagree (a loop of hysteresis, an edge, noise), the threshold is higher. A deviation that lasts for some poses
+in time, or repeats at the same pose, is no outlier. If all outliers are the ends of an output, read too small, and
+chance does not explain that, the output may have a limit that no other pose reaches: then they are none either. A
+search for effects leaves outliers out, and messages always name them; a person decides whether to exclude them.
 
 Source  Rousseeuw and Croux, J. Am. Statist. Assoc. 88 (1993), 1273: the median of absolute deviations as a scale.
 """
@@ -66,7 +66,8 @@ def _may_reach_limit(complete: Fit, rows: NDArray[np.intp]) -> bool:
     highest, lowest = np.argmax(expected, axis=1), np.argmin(expected, axis=1)
     return all(
         any(
-            (row == highest[k] and complete.residual[k, row] < 0) or (row == lowest[k] and complete.residual[k, row] > 0)
+            (row == highest[k] and complete.residual[k, row] < 0)
+            or (row == lowest[k] and complete.residual[k, row] > 0)
             for k in range(len(expected))
         )
         for row in rows

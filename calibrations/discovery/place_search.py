@@ -25,9 +25,10 @@ from calibrations.fitting.determined import loses_parameters
 from calibrations.fitting.fit import Fit, refit
 from calibrations.fitting.noise_fit import deviance
 from calibrations.fitting.shown_forms import Shown, forms_at
+from calibrations.free_forms.acting_places import ActingPlace
 from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.geometry import GEOMETRY, LINEAR_PART
-from calibrations.free_forms.naming import FIRST_FORM, FOLLOWERS, MOST_NAMES, NAMED, NEXT_FORM, ActingPlace
+from calibrations.free_forms.naming import FIRST_FORM, FOLLOWERS, MOST_NAMES, NAMED, NEXT_FORM
 from calibrations.free_forms.place_names import EFFECTS_AT, PREFIX, place_of_effect
 from calibrations.free_forms.poses import logged_columns
 from calibrations.free_forms.reml import Sizes, estimate

@@ -19,9 +19,9 @@ from calibrations.discovery.search import cost, first_order_cost
 from calibrations.discovery.significance import chance, of_search
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.shown_forms import Shown, form_columns, forms_at
+from calibrations.free_forms.acting_places import FORM_OF
 from calibrations.free_forms.bases import Basis, Line, Spline, spline
 from calibrations.free_forms.form import Factor, Form
-from calibrations.free_forms.naming import FORM_OF
 from calibrations.free_forms.place_names import place_of_effect
 from calibrations.free_forms.rivals import MOSTLY
 from calibrations.free_forms.selection import ENTER

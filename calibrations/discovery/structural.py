@@ -35,8 +35,8 @@ from calibrations.effects import Effect
 from calibrations.fitting.fit import Fit, fit, refit, with_least_white
 from calibrations.fitting.problem_kinds import make_problem
 from calibrations.fitting.requested_forms import BASE, effects_beyond_base
+from calibrations.free_forms.acting_places import ActingPlace
 from calibrations.free_forms.geometry import GEOMETRY, GeometryEffects
-from calibrations.free_forms.naming import ActingPlace
 from calibrations.free_forms.place_names import PREFIX
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.search import search
@@ -133,7 +133,7 @@ def search_structure(
     needed = [name for name in basic if chance(*first_order_cost(best.end, name, shared=True)) < SIGNIFICANT]
     report("fitting the model with one effect more at a time")
     if needed != basic:
-        base = fit_each_axis(start, needed, effects)
+        base = fit_each_axis(start, needed, effects).in_floor(base.noise.floor)
     selected, fits = _fit_each_addition(base, best, renew=needed != basic)
     if floor is not None and stated_white is not None:
         fits[-1] = with_least_white(fits[-1], stated_white)
@@ -158,6 +158,7 @@ def _best_structure(base: Fit, effects: Mapping[str, Effect]) -> tuple[Fit, _Str
     if places.floor_source is not FloorSource.SAMPLES and base.noise.known:
         base = fit(base.model, with_white(base.table, places.white))
         return base, _fit_structure(base, places, effects), places.floor_source
+    base = base.in_floor(rms(places.white))
     best = _fit_structure(base, places, effects)
     if from_stairs is not None and from_stairs.end.held_out_excess < min(best.end.held_out_excess, NEARLY):
         best = from_stairs
@@ -177,8 +178,8 @@ def _fit_each_addition(base: Fit, best: _StructureFit, renew: bool) -> tuple[lis
     selected, fits = fit_one_by_one(base, selected, end)
     curves = {a.effect.name.removeprefix(PREFIX) for a in best.forms}
     with_curve = [place.causes for place in best.structure.places if place.name in curves]
-    significant = significant_causes(fits[-1], best.structure.causes)
-    return _without_idle_additions(selected, fits, needed_causes(with_curve, significant))
+    needed = needed_causes(with_curve, significant_causes(fits[-1], best.structure.causes))
+    return _without_idle_additions(selected, fits, needed, set(best.structure.causes) - needed)
 
 
 def needed_causes(with_curve: Sequence[Sequence[str]], significant: set[str]) -> set[str]:
@@ -196,35 +197,35 @@ def significant_causes(end: Fit, causes: Sequence[str]) -> set[str]:
 
 
 def _without_idle_additions(
-    selected: list[Addition], fits: list[Fit], causes: Collection[str]
+    selected: list[Addition], fits: list[Fit], needed: Collection[str], insignificant: Collection[str]
 ) -> tuple[list[Addition], list[Fit]]:
     """The additions and fits without those that lower neither the error of the fit nor the unseen error.
 
     Slow noise, or a free form beside them, describes their part as well, or it is the product of two causes, of which
     the search takes the sum. All are left out at once, or, where the unseen error grows by that, one after another.
-    `causes` are kept.
+    An `insignificant` cause may have lowered the error until a later one described its part too: each of these is left
+    out by itself. The effects that are `needed` are kept.
     """
     base, end = fits[0], fits[-1]
     remaining = {
         addition.effect.name: after.pooled_excess / before.pooled_excess if before.pooled_excess > 0 else 1.0
         for addition, (before, after) in zip(selected, pairwise(fits), strict=True)
-        if addition.effect.name not in causes
+        if addition.effect.name not in needed
     }
     idle = [a for a in selected if remaining.get(a.effect.name, 0.0) >= IDLE]
-    if not idle or len(idle) == len(selected):
-        return selected, fits
     idle.sort(key=lambda a: remaining[a.effect.name], reverse=True)
-    needed, without = selected, end
-    for left_out in (idle, *([addition] for addition in idle if len(idle) > 1)):
-        fewer = [a for a in needed if a not in left_out]
+    described = [a for a in selected if a.effect.name in insignificant and a not in idle]
+    kept, without = selected, end
+    for left_out in (idle, *([addition] for addition in idle if len(idle) > 1), *([cause] for cause in described)):
+        fewer = [a for a in kept if a not in left_out]
+        if not fewer or len(fewer) == len(kept):
+            continue
         alternative = fit_together(base, fewer)
         if alternative.held_out_excess <= NO_WORSE * end.held_out_excess:
-            needed, without = fewer, alternative
-            if left_out is idle:
-                break
-    if len(needed) == len(selected):
+            kept, without = fewer, alternative
+    if len(kept) == len(selected):
         return selected, fits
-    return needed, [base, *fit_successively(base, without, needed)]
+    return kept, [base, *fit_successively(base, without, kept)]
 
 
 @dataclass(frozen=True)

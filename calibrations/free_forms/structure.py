@@ -12,12 +12,12 @@ from scipy.optimize import nnls
 from scipy.special import chdtri  # scipy.stats takes 0.4 s to load
 
 from calibrations.criteria import LARGER_NOISE, LEAST_NOISE, SIGNIFICANT
+from calibrations.free_forms.acting_places import ActingPlace, places
 from calibrations.free_forms.bases import Line
 from calibrations.free_forms.chain import Coefficients, ModelEffects
 from calibrations.free_forms.descent import SearchResult
 from calibrations.free_forms.form import CROSS, Form
 from calibrations.free_forms.geometry import LINEAR_PART, Geometry, GeometryEffects, geometry
-from calibrations.free_forms.naming import ActingPlace, places
 from calibrations.free_forms.place_names import place_of_effect
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.search import NOISE_ALONE, search

@@ -9,8 +9,8 @@ import pytest
 
 from calibrations.discovery.findings import Findings
 from calibrations.discovery.plausibility import _stuck
+from calibrations.free_forms.acting_places import _size_of_unshared_part
 from calibrations.free_forms.geometry import _fit_angles
-from calibrations.free_forms.naming import _size_of_unshared_part
 from calibrations.free_forms.places import _stages
 from calibrations.free_forms.structure import FloorSource, Structure
 

@@ -8,9 +8,9 @@ import pytest
 from calibrations.discovery.results import Discovery
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit
+from calibrations.free_forms.acting_places import places
 from calibrations.free_forms.chain import ModelEffects, start
 from calibrations.free_forms.descent import Point, Setting, finish
-from calibrations.free_forms.naming import places
 from calibrations.free_forms.places import components
 from calibrations.free_forms.poses import PoseData
 from calibrations.loop import dataset

@@ -51,8 +51,25 @@ def test_idle_additions_go_one_by_one_where_one_of_them_is_needed(monkeypatch: p
 
     monkeypatch.setattr(structural, "fit_together", together)
     monkeypatch.setattr(structural, "fit_successively", lambda base, end, additions: [end for _ in additions])
-    kept, _ = structural._without_idle_additions([cause, needed, idle], fits, ["temperature-bias"])
+    kept, _ = structural._without_idle_additions([cause, needed, idle], fits, ["temperature-bias"], [])
     assert [a.effect.name for a in kept] == ["temperature-bias", "saturation"]
+
+
+def test_an_insignificant_cause_is_left_out_where_a_later_one_describes_its_part(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    first, later = addition("cubic-nonlinearity"), addition("saturation")
+    fits = [SimpleNamespace(pooled_excess=e, held_out_excess=e) for e in (9.0, 2.0, 1.0)]
+
+    def together(base: object, additions: list[Addition]) -> SimpleNamespace:
+        error = 1.0 if later in additions else 2.0
+        return SimpleNamespace(pooled_excess=error, held_out_excess=error)
+
+    monkeypatch.setattr(structural, "fit_together", together)
+    monkeypatch.setattr(structural, "fit_successively", lambda base, end, additions: [end for _ in additions])
+    for insignificant, names in ((["cubic-nonlinearity"], ["saturation"]), ([], ["cubic-nonlinearity", "saturation"])):
+        kept, _ = structural._without_idle_additions([first, later], fits, ["saturation"], insignificant)
+        assert [a.effect.name for a in kept] == names
 
 
 def test_a_cause_whose_values_are_noise_in_the_fitted_model_is_not_significant() -> None:
