@@ -15,7 +15,7 @@ FIRST_FORM = 0.2  # of a place's variance: the least that the first form must ex
 NEXT_FORM = 0.05  # of a place's variance: the least that a second form must explain; less may be the form of the first
 LEAST_NEEDED = 0.02  # of a place's variance: the least that the other forms must lose without this one
 NAMED = 0.9  # of a place's variance: the least that the forms must explain together
-NAMED_ALONE = 0.5  # the same for the only effect of its place that the curve resembles at all: most of the curve
+NAMED_ALONE = 0.5  # the same for the only effect that the curve resembles, or that the search took: most of it
 MOST_FORMS = 2  # forms, at most, that only approximate a curve
 MOST_NAMES = 3  # causes of one curve, at most: four forms, each with a shape of its own, approximate any curve
 JUMPS = 4.0  # excess kurtosis of a walk's increments: 500 of a Gaussian process keep within +-1
@@ -77,7 +77,9 @@ def _name_effects(
     narrow = [cause for cause, comps in forms.items() if not any(comp.contains in forms for comp in comps)]
     each_alone = [_select_causes([cause], acting_causes, (), curve, options_of) for cause in narrow]
     resembling = [(named, share_alone) for named, share_alone in each_alone if named]
-    return resembling[0] if len(resembling) == 1 and resembling[0][1] >= NAMED_ALONE else ((), share)
+    taken = {result.component(name).cause for name in names if result.component(name).form is None}
+    alone = resembling if len(resembling) == 1 else [each for each in resembling if taken == set(each[0])]
+    return alone[0] if alone and alone[0][1] >= NAMED_ALONE else ((), share)
 
 
 def _forms_by_cause(result: SearchResult, place: str, names: Sequence[str]) -> dict[str, list[Component]]:
