@@ -17,6 +17,7 @@ from calibrations.table import Array
 LEAST_SIZE = 0.6  # noise floors: a smaller place is a refinement
 LEAST_OWN = 0.3  # noise floors: part of a place with a cause that no other place explains, if the residual is noise
 LEAST_SHARE = 0.015  # of the largest place's size
+LEAST_BESIDE_LOOPS = 0.1  # of the size of a hysteresis in another form, of which slip elements leave a part
 LEAST_UNKNOWN = 1.0  # noise floors: size of a place whose cause is unknown
 LEAST_UNKNOWN_SHARE = 0.05  # of the largest place's size: the part of such a place that no other one explains
 READING_ERRORS = 1.5  # times the residual by the errors of noisy columns, whose size is uncertain
@@ -25,9 +26,11 @@ DEFINED_BY_PLACE = {
     "temperature-scale": "temperature-scale",
     "column:supply_v": "supply-sensitivity",
     "column:std": "vibration-rectification",
+    "output": "adc-nonlinearity",
 }  # effects of which any curve at the place is a form: they say what the output depends on, not how
 CANCELLED = 3.0  # of what the base leaves: a larger place is cancelled by another one, and neither has the true curve
 FORM_OF = 0.25  # of another place's size: a place of which no more is its own may be a part of that place's form
+HISTORY = "history"
 
 PlaceSizes = Mapping[str, float]  # of each place, rms in noise floors
 
@@ -105,11 +108,11 @@ def _acting_place(
     gain, alternatives = gain_and_rivals(result, names, {other for other in sizes if part < FORM_OF * sizes[other]})
     replacements = [replacements_of(result, names, causes, cause) for cause in causes] if len(names) > 1 else []
     alternatives = tuple(sorted({*alternatives, *(name for each in replacements for name in each)} - set(causes)))
-    least = LEAST_SHARE * largest
+    least = _least_size(result, place, sizes)
     if all_walk(names):
-        least = max(LEAST_UNKNOWN_SHARE * largest, READING_ERRORS * _reading_errors(result, sizes))
+        least = max(least, LEAST_UNKNOWN_SHARE * largest, READING_ERRORS * _reading_errors(result, sizes))
     elif STEPS in names:  # their positions are those of the residual: they also follow the corners of a larger place
-        least = LEAST_UNKNOWN_SHARE * largest
+        least = max(least, LEAST_UNKNOWN_SHARE * largest)
     # a place without a form of the catalogue, or smaller than the excess of the residual, is more often a remainder
     least_own = min(LEAST_SIZE, max(LEAST_OWN, _excess(result))) if causes else LEAST_SIZE
     material = own >= least_own and size >= max(least_own, least)
@@ -119,6 +122,14 @@ def _acting_place(
     )
     defined = acting_place.unknown and place in DEFINED_BY_PLACE and not _is_cancelled(result, curves[place])
     return replace(acting_place, causes=(DEFINED_BY_PLACE[place],)) if defined else acting_place
+
+
+def _least_size(result: SearchResult, place: str, sizes: PlaceSizes) -> float:
+    """The size from which a place counts beside the others."""
+    least = LEAST_SHARE * max(sizes.values())
+    loops = [name for name in result.active if result.component(name).place == HISTORY]
+    in_another_form = place != HISTORY and any(result.component(name).form is not None for name in loops)
+    return max(least, LEAST_BESIDE_LOOPS * sizes[HISTORY]) if in_another_form else least
 
 
 def _size_of_unshared_part(result: SearchResult, gain: float) -> float:
@@ -134,8 +145,10 @@ def _excess(result: SearchResult) -> float:
 def _with_substitutes(result: SearchResult, acting_places: Sequence[ActingPlace]) -> list[ActingPlace]:
     """The places. If two explain most of each other, the larger one counts, and the smaller one is its alternative."""
     places_kept = list(acting_places)
+    sizes = {place.name: place.size for place in acting_places}
     for i, place in enumerate(places_kept):
-        if (place.material and place.own >= LEAST_SIZE) or place.size < max(LEAST_SIZE, LEAST_SHARE * place.largest):
+        least = max(LEAST_SIZE, _least_size(result, place.name, sizes))
+        if (place.material and place.own >= LEAST_SIZE) or place.size < least:
             continue
         for substitute in (o for o in places_kept[i + 1 :] if not o.material):
             gain = result.cost_without((*place.components, *substitute.components))
