@@ -15,9 +15,12 @@ FIRST_FORM = 0.2  # of a place's variance: the least that the first form must ex
 NEXT_FORM = 0.05  # of a place's variance: the least that a second form must explain; less may be the form of the first
 LEAST_NEEDED = 0.02  # of a place's variance: the least that the other forms must lose without this one
 NAMED = 0.9  # of a place's variance: the least that the forms must explain together
-NAMED_ALONE = 0.5  # the same for the only effect that the curve resembles, or that the search took: most of it
+NAMED_ALONE = 0.5  # the same for the only effect of its place that the curve resembles at all: most of the curve
 MOST_FORMS = 2  # forms, at most, that only approximate a curve
 MOST_NAMES = 3  # causes of one curve, at most: four forms, each with a shape of its own, approximate any curve
+WARM_UPS = ("warm-up-bias", "warm-up-scale")
+SETTLED = 0.2  # of the record: the longest time constant of what has settled at its end, to less than 1 %
+TWO_MASSES = ((0.04, 0.12), (0.02, 0.06))  # of the record: time constants from which their search starts, and its steps
 JUMPS = 4.0  # excess kurtosis of a walk's increments: 500 of a Gaussian process keep within +-1
 UNSEEN = 0.3  # noise floors: a smaller residual of an effect does not show that a wider effect is the cause
 CLEARLY_LESS = 1.5  # ratio of the rms residuals of two effects from which one of them is not the cause
@@ -66,7 +69,8 @@ def _name_effects(
         return _one_name(result, names, needed_causes, curve, Q), share
 
     def options_of(cause: str, chosen: Sequence[Array]) -> Sequence[Array]:
-        return [*columns[cause], *_at_best_shapes(result, forms[cause], curve, chosen, Q)]
+        options = [*columns[cause], *_at_best_shapes(result, forms[cause], curve, chosen, Q)]
+        return [*options, *_two_masses(result, forms[cause], curve, chosen, Q)] if cause in WARM_UPS else options
 
     walks = {result.component(name).cause for name in names if "/walk-" in name}
     first = [cause for cause in acting_causes if cause and cause not in walks] if walks else []  # walks follow anything
@@ -77,9 +81,7 @@ def _name_effects(
     narrow = [cause for cause, comps in forms.items() if not any(comp.contains in forms for comp in comps)]
     each_alone = [_select_causes([cause], acting_causes, (), curve, options_of) for cause in narrow]
     resembling = [(named, share_alone) for named, share_alone in each_alone if named]
-    taken = {result.component(name).cause for name in names if result.component(name).form is None}
-    alone = resembling if len(resembling) == 1 else [each for each in resembling if taken == set(each[0])]
-    return alone[0] if alone and alone[0][1] >= NAMED_ALONE else ((), share)
+    return resembling[0] if len(resembling) == 1 and resembling[0][1] >= NAMED_ALONE else ((), share)
 
 
 def _forms_by_cause(result: SearchResult, place: str, names: Sequence[str]) -> dict[str, list[Component]]:
@@ -204,6 +206,21 @@ def _at_best_shapes(
     """Columns of the components of one cause that have one value of shape, each at the shape that leaves least."""
     shaped = [c for c in comps if c.reshaped and len(c.shape) == 1 and c.form is None and not c.contains]
     return [_columns_of(result, _residual_at_best(result, c, curve, Q, companions)[1], Q) for c in shaped]
+
+
+def _two_masses(
+    result: SearchResult, comps: Sequence[Component], curve: Array, companions: Sequence[Array], Q: Array
+) -> list[Array]:
+    """Columns of two exponential approaches, of any signs, that end within the record: those of two thermal masses."""
+    reshaped = next((c.reshaped for c in comps if c.reshaped and c.form is None), None)
+    if reshaped is None:
+        return []
+
+    def columns(shape: Sequence[float]) -> Array:
+        return np.hstack([_columns_of(result, reshaped((min(abs(part), SETTLED),)), Q) for part in shape])
+
+    best = climb(lambda shape: -_residual_squares([*companions, columns(shape)], curve), *TWO_MASSES)
+    return [columns(best)]
 
 
 def _columns_of(result: SearchResult, comp: Component, Q: Array) -> Array:

@@ -73,13 +73,13 @@ def test_no_effect_is_added_that_makes_a_magnitude_of_anything() -> None:
     np.testing.assert_allclose([e.value / 9.81 for e in scales], [1.02, 0.99, 1.01], atol=0.01)
 
 
-def mixed_poses(of_time: Array) -> Table:
-    """104 poses in random order whose scale factor follows `of_time`; no column tells the noise of 50 uV."""
+def mixed_poses(of_row: Array, **logged: Array) -> Table:
+    """104 poses in random order whose scale factor follows `of_row`; no column tells the noise of 50 uV."""
     columns = synthetic.turns((90, 30, 150, 60), step_deg=30.0)
     mixed = np.random.default_rng(5).permutation(len(columns["t_s"]))
     columns |= {name: columns[name][mixed] for name in ("alpha_deg", "beta_deg", "direction")}
     x, y, _ = synthetic.components(columns)
-    told = synthetic.poses(columns, 2.5 + x * (1 + of_time), 2.5 + y * (1 + of_time))
+    told = synthetic.poses({**columns, **logged}, 2.5 + x * (1 + of_row), 2.5 + y * (1 + of_row))
     return replace(told, columns={name: column for name, column in told.columns.items() if name != "n"})
 
 
@@ -88,6 +88,15 @@ def test_a_scale_factor_that_warms_up_is_found_in_mixed_poses_of_unknown_noise()
     found = discover(mixed_poses(4e-3 * np.exp(-np.arange(104) / 15.0)), read_model("linear"))
     assert found.causes == ("warm-up-scale",)
     assert found.start.pooled_excess > 8
+    assert found.end.pooled_excess < 1.2
+
+
+def test_a_scale_factor_that_follows_the_supply_is_found_in_mixed_poses_of_unknown_noise() -> None:
+    """It is a line over the supply, and no ratiometric output: only the free form of the cause describes it."""
+    supply_v = 5 + 0.1 * np.random.default_rng(8).standard_normal(104)
+    found = discover(mixed_poses(0.05 * (supply_v - 5), supply_v=supply_v), read_model("linear"))
+    assert found.causes == ("supply-sensitivity",)
+    assert found.start.pooled_excess > 20
     assert found.end.pooled_excess < 1.2
 
 

@@ -274,9 +274,9 @@ def test_a_cause_in_another_form_keeps_its_curve() -> None:
     assert result.end.held_out_excess < 1.15
 
 
-def test_a_curve_of_which_a_form_of_the_catalogue_is_only_a_part_has_an_unknown_cause() -> None:
+def test_a_curve_of_which_a_form_of_the_catalogue_is_the_smaller_part_has_an_unknown_cause() -> None:
     cross = forces_of_sweep()[:, [1, 0]]
-    result = discover(poses(1e-3 * cross**2 + 4e-4 * np.cos(6 * cross) + 5e-4 * cross))
+    result = discover(poses(1e-3 * cross**2 + 7e-4 * np.cos(6 * cross) + 5e-4 * cross))
     assert (result.verdict, result.causes) == (Verdict.UNEXPLAINED, ())
     assert [place.name for place in result.findings.places if place.unknown] == ["cross-response"]
 

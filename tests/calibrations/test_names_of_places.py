@@ -1,0 +1,66 @@
+"""Which name the curve of a place gets: from its place, from the effect that it resembles, or none."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from calibrations.discovery.results import Discovery
+from calibrations.free_forms.acting_places import _least_size
+from calibrations.loop import discover
+from calibrations.model.file import read_model
+from calibrations.table import Array
+from tests.calibrations.synthetic import components, poses, turns
+
+COLUMNS = turns((90, 30, 150), step_deg=15.0)
+ROWS = len(COLUMNS["t_s"])
+SHARE = np.arange(ROWS) / ROWS
+
+
+def found(added: Array, **logged: Array) -> Discovery:
+    """Causes of a linear sensor with `added` (n,) in one output and, of the other sign, in the other one."""
+    x, y, _ = components(COLUMNS)
+    return discover(poses({**COLUMNS, **logged}, 2.5 + x + added, 2.5 + y - 0.7 * added), read_model("linear"))
+
+
+def test_a_curve_over_the_temperature_is_temperature_bias_in_any_form() -> None:
+    """What an output with a compensation of first order leaves: a cubic without its line."""
+    temperature_c = 25 + 10 * np.sin(2 * np.pi * 2.3 * SHARE)
+    u = (temperature_c - 25) / 10
+    cubic = 2e-3 * (u**3 - u * np.sum(u**4) / np.sum(u**2))
+    result = found(cubic, temperature_c=temperature_c)
+    assert result.causes == ("temperature-bias",)
+    assert "free:temperature-bias" in [step.name for step in result.steps]
+    assert result.end.pooled_excess < 1.2
+
+
+@pytest.mark.parametrize(("fast", "slow"), [(0.05, 0.2), (0.08, 0.3)])
+def test_a_warm_up_of_two_masses_of_opposite_sign_is_a_warm_up(fast: float, slow: float) -> None:
+    """One exponential explains it no better than a drift does; of two, only a constant remains after a fifth of it."""
+    result = found(3e-3 * (np.exp(-SHARE / fast) - np.exp(-SHARE / slow)))
+    assert result.causes == ("warm-up-bias",)
+    assert result.end.pooled_excess < 1.2
+
+
+@pytest.mark.parametrize(("second", "causes"), [(0.015, ("stage-eccentricity",)), (0.05, ())])
+def test_an_error_of_the_stage_that_is_mostly_its_first_wave_is_an_eccentricity(
+    second: float, causes: tuple[str, ...]
+) -> None:
+    beta = np.radians(COLUMNS["beta_deg"])
+    turned = {**COLUMNS, "beta_deg": COLUMNS["beta_deg"] + 0.03 * np.sin(beta) + second * np.sin(2 * beta + 1)}
+    x, y, _ = components(turned)
+    result = discover(poses(COLUMNS, 2.5 + x, 2.5 + y), read_model("linear"))
+    assert result.causes == causes
+    assert [place.name for place in result.findings.places] == ["stage-angle-beta"]
+
+
+@pytest.mark.parametrize(("form", "place", "least"), [("slip", "own-response", 2.0), (None, "own-response", 0.3),
+                                                      ("slip", "history", 0.3)])  # fmt: skip
+def test_beside_a_hysteresis_in_another_form_a_place_needs_a_tenth_of_its_size(
+    form: str | None, place: str, least: float
+) -> None:
+    component = SimpleNamespace(place="history", form=form)
+    result = SimpleNamespace(active=["history/slip"], component=lambda _: component)
+    assert _least_size(result, place, {"history": 20.0, "own-response": 1.0}) == pytest.approx(least)
