@@ -38,7 +38,7 @@ def test_a_curve_over_the_temperature_is_temperature_bias_in_any_form() -> None:
 
 @pytest.mark.parametrize(("fast", "slow"), [(0.05, 0.2), (0.08, 0.3)])
 def test_a_warm_up_of_two_masses_of_opposite_sign_is_a_warm_up(fast: float, slow: float) -> None:
-    """One exponential explains it no better than a drift does; of two, only a constant remains after a fifth of it."""
+    """One exponential explains it no better than a drift does."""
     result = found(3e-3 * (np.exp(-SHARE / fast) - np.exp(-SHARE / slow)))
     assert result.causes == ("warm-up-bias",)
     assert result.end.pooled_excess < 1.2
