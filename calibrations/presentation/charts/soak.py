@@ -39,6 +39,13 @@ TIME = "time since power-on (h)"
 SHOWN = 600  # means of the still record that a line is drawn through, at most
 CURVE = 400  # points of a fitted curve
 WINDOW = 1.6  # times the whole drift: height of the chart; the bounds are far wider in the beginning
+DOTS = "Dots are reversals, with their standard errors"
+APPROACH = (
+    "; the line is the exponential approach with its standard error. The grey band is the expanded uncertainty of one "
+    "reversal about the final value: within it no measurement can separate the remaining drift from noise. The broken "
+    "line is the time from which the drift stays within it"
+)
+STILL = " The thin grey line is the record of the level sensor between reversals, shifted onto the bias."
 FORECAST_LEGEND = (
     "Final values of bias and scale factor by the Kalman filters' forecasts at each time: a line within its 95 % "
     "bounds, less the last forecast. The dotted line is the drift at that time. The broken line is the time from which "
@@ -48,12 +55,6 @@ FORECAST_LEGEND = (
 
 def soak_album(soak: Soak, histories: Mapping[str, ForecastHistory] = MappingProxyType({})) -> list[Picture]:
     """All pictures of a soak and of its forecasts, with captions."""
-    course = (
-        "Dots are reversals, with their standard errors; the line is the exponential approach with its standard error. "
-        "The grey band is the expanded uncertainty of one reversal about the final value: within it no measurement can "
-        "separate the remaining drift from noise. The broken line is the time from which the drift stays within it. "
-        "The thin grey line is the record of the level sensor between reversals, shifted onto the bias."
-    )
     surroundings_words = (
         "Conditions during the soak: the sensor's temperature, its supply, and the noise of single samples hour by "
         "hour."
@@ -62,14 +63,16 @@ def soak_album(soak: Soak, histories: Mapping[str, ForecastHistory] = MappingPro
         "Difference of neighbouring means of the still record over the time of a mean: white noise falls with the "
         "square root of time, drift rises with it."
     )
-    pictures = [
-        Picture("drift", "Bias and scale factor since power-on", course, drift(soak)),
-        Picture("night", "Temperature, supply and noise", surroundings_words, surroundings(soak)),
-    ]
+    approach = APPROACH if any(course.state for course in soak.courses.values()) else ""
+    course = f"{DOTS}{approach}.{STILL if soak.holds.n else ''}"
+    pictures = [Picture("drift", "Bias and scale factor since power-on", course, drift(soak))]
     if histories:
-        pictures.insert(
-            1, Picture("foreseen", "Forecasts of the final values", FORECAST_LEGEND, forecasts(soak, histories))
+        pictures.append(
+            Picture("foreseen", "Forecasts of the final values", FORECAST_LEGEND, forecasts(soak, histories))
         )
+    if not soak.holds.n:  # the run ended before the first block of the still record
+        return pictures
+    pictures.append(Picture("night", "Temperature, supply and noise", surroundings_words, surroundings(soak)))
     times_s, _ = soak.allan(soak.axes[0])
     return [*pictures, Picture("allan", "Allan deviation", noise, allan(soak))] if len(times_s) else pictures
 
@@ -156,7 +159,7 @@ def _course(soak: Soak, course: Course, factor: float, label: str, title: str = 
     """A panel with one quantity as the change from its final value, times `factor`."""
     state, final, colour = course.state, _final(course), COLOURS[course.axis]
     series: list[Series] = list(_gaps(soak))
-    if course.quantity == "bias":
+    if course.quantity == "bias" and soak.holds.n:
         t_s, volts = _shift_still(soak, course)
         series.append(Line(t_s / HOUR_S, factor * (volts - final), colour=BAND, width=0.8))
     if state is not None:
@@ -170,7 +173,7 @@ def _course(soak: Soak, course: Course, factor: float, label: str, title: str = 
                          high=values + stds))  # fmt: skip
     drawn_values = np.append(values, 0.0)
     margin = 0.12 * np.ptp(drawn_values) + factor * (state.tolerance if state else 0.0)
-    y = Axis(label, low=drawn_values.min() - margin, high=drawn_values.max() + margin)
+    y = Axis(label, low=drawn_values.min() - margin, high=drawn_values.max() + margin) if margin else Axis(label)
     return Panel((*series, *_steady(course)), Axis(TIME, low=_begin_h(soak)), y, title)
 
 

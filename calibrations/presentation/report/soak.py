@@ -95,7 +95,9 @@ def _headline(soak: Soak, forecasts: Mapping[str, ForecastHistory]) -> str:
         return f"Bias and scale factor are steady {_hours(time)} h after power-on."
     if any(course.state is None for course in soak.courses.values()):
         return "Too few reversals to decide whether bias and scale factor are steady."
-    waiting = [name.replace("-", " of ") for name, course in soak.courses.items() if course.time_s is None]
+    waiting = [
+        f"{_spelt(course.quantity)} of {course.axis}" for course in soak.courses.values() if course.time_s is None
+    ]
     text = f"No steady state within {_span_h(soak)} h: {join_words(waiting)} may still drift."
     bounds = steady_time(forecasts)
     if bounds is None:
@@ -110,8 +112,12 @@ def _headline(soak: Soak, forecasts: Mapping[str, ForecastHistory]) -> str:
 def _summary(soak: Soak) -> str:
     """The amount of data, and possible disturbances."""
     held_h = float(np.sum(soak.holds.column("n"))) / soak.table.number("sample_rate_hz", 1.0) / HOUR_S
-    reversals = len(next(iter(soak.courses.values())).t_s)
-    text = f"The record holds every sample of {rounded(held_h)} h at rest, and {reversals} reversals."
+    count = len(next(iter(soak.courses.values())).t_s)
+    reversals = f"{count} reversal{'s' * (count > 1)}"
+    if held_h:
+        text = f"The record holds every sample of {rounded(held_h)} h at rest, and {reversals}."
+    else:
+        text = f"The soak ended before the record at rest began. The record holds {reversals}."
     wander_k = soak.temperature_wander_k
     if wander_k is not None and wander_k > LARGEST_WANDER_K:
         text += (
@@ -150,7 +156,7 @@ def _figures(soak: Soak) -> list[tuple[str, str, str]]:
 def _course(course: Course, output_unit: str) -> tuple[str, ...]:
     """One row of the table; `output_unit` is the unit of the outputs: a bias in mV, a scale factor in mV/g."""
     state, (factor, unit) = course.state, in_milli(output_unit if course.quantity == "bias" else f"{output_unit}/g")
-    name = course.quantity.replace("scale", "scale factor")
+    name = _spelt(course.quantity)
     if state is None:
         return name, course.axis, rounded(factor * course.values[-1], 6), "–", "–", unit, "–", "–"
     taus = [estimate_text(*(value / HOUR_S for value in term.tau_s)) for term in state.terms]
@@ -166,6 +172,10 @@ def _course(course: Course, output_unit: str) -> tuple[str, ...]:
     )
 
 
+def _spelt(quantity: str) -> str:
+    return quantity.replace("scale", "scale factor")
+
+
 def _outlook(name: str, history: ForecastHistory, output_unit: str) -> tuple[str, ...]:
     """One row of the forecasts: the last forecast with its 95 % bounds, and when it became known."""
     quantity, _, axis = name.partition("-")
@@ -178,7 +188,7 @@ def _outlook(name: str, history: ForecastHistory, output_unit: str) -> tuple[str
     else:
         value = f"not known: {rounded(factor * final.low, 6)} to {rounded(factor * final.high, 6)}"
     known_after = "–" if known_s is None else rounded(known_s / HOUR_S)
-    return quantity.replace("scale", "scale factor"), axis, value, unit, known_after
+    return _spelt(quantity), axis, value, unit, known_after
 
 
 def _gap(gap: RecordGap) -> str:
