@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,8 +11,8 @@ from calibrations.tables import FITTED_KINDS
 from calibrations.text import (
     bound,
     columns,
-    concise_in_prefix,
-    estimate_in_prefix,
+    concise,
+    estimate_text,
     in_prefix,
     join_words,
     rounded,
@@ -22,7 +22,8 @@ from calibrations.text import (
 from rig.record import Run
 from rig.services.page_words import PageStep, page_step
 
-SPREADS = re.compile("tolerance|wander")  # uncertainties themselves
+SPREADS = re.compile("tolerance|wander|residual")  # uncertainties themselves
+RELATIVE = {"": "%", "1/K": "%/K"}  # units of a relative change, by that of the result
 SPREAD_DIGITS, TIME_DIGITS = 2, 3
 # By the name of a result that is beyond its limit: what to look at. The first that fits counts.
 REMEDIES = {
@@ -134,7 +135,7 @@ def results_table(results: Mapping[str, Any]) -> list[str]:
     if not results:
         return []
     rows = result_rows(results, _value_in_terminal)
-    cells = [(row.name, row.value, row.limit.replace("−", "-") or "-", row.verdict) for row in rows]
+    cells = [(row.name, row.value, _ascii(row.limit) or "-", row.verdict) for row in rows]
     return columns(("result", "value", "limit", "verdict"), cells).splitlines()
 
 
@@ -156,10 +157,9 @@ class ResultRow:
 
 
 def _value_on_page(name: str, result: Mapping[str, Any]) -> str:
-    if (digits := _digits(name, result)) is not None:
-        value, _, unit_text = _digits_text(result, digits).partition(" ")
-        return f"{value} {unit(unit_text)}".rstrip()
-    return estimate_in_prefix(result["value"], result["std"], result["unit"])
+    value, std, unit_name = _readable(name, result)
+    digits = _digits(name, result)
+    return f"{estimate_text(value, std) if digits is None else rounded(value, digits)} {unit(unit_name)}".rstrip()
 
 
 def result_rows(
@@ -174,7 +174,7 @@ def result_rows(
     for name, r in results.items():
         if name in listed:
             continue
-        limit, verdict = "" if r["limit"] is None else bound(r["value"], r["limit"]), r["verdict"] or ""
+        limit, verdict = "" if r["limit"] is None else _limit_text(name, r), r["verdict"] or ""
         if (steady := STEADY.fullmatch(name)) is not None:
             times = _steady_times(results, steady)
             listed |= {part for part in times.values() if results[part]["limit"] is None}
@@ -197,7 +197,7 @@ def _steady_times(results: Mapping[str, Any], steady: re.Match[str]) -> dict[str
 
 def _steady_sentence(reached: bool, parts: Mapping[str, Any]) -> str:
     """Whether and when the sensor is steady. `parts`: the results of the time and of its forecast that there are."""
-    times = {end: _digits_text(r, TIME_DIGITS) for end, r in parts.items()}
+    times = {end: f"{rounded(r['value'], TIME_DIGITS)} {r['unit']}" for end, r in parts.items()}
     if reached:
         if "time" not in times:
             return "Reached."
@@ -212,9 +212,37 @@ def _steady_sentence(reached: bool, parts: Mapping[str, Any]) -> str:
 
 
 def _value_in_terminal(name: str, result: Mapping[str, Any]) -> str:
-    if (digits := _digits(name, result)) is not None:
-        return _digits_text(result, digits).replace("µ", "u").replace("−", "-")
-    return concise_in_prefix(result["value"], result["std"], result["unit"])
+    value, std, unit_name = _readable(name, result)
+    digits = _digits(name, result)
+    text = concise(value, std) if digits is None else rounded(value, digits)
+    return _ascii(f"{text} {unit_name}".rstrip())
+
+
+def _ascii(text: str) -> str:
+    return text.replace("µ", "u").replace("−", "-")
+
+
+def _limit_text(name: str, result: Mapping[str, Any]) -> str:
+    """The limit in the prefix that reads best, which may be another one than that of the value."""
+    limit = result["limit"]
+    ends = limit if isinstance(limit, Sequence) else [limit]
+    factor, unit_name = _scale(name, max(map(abs, ends)), None, result["unit"])
+    scaled = [end * factor for end in ends]
+    return f"{bound(result['value'], scaled if isinstance(limit, Sequence) else scaled[0])} {unit(unit_name)}".rstrip()
+
+
+def _readable(name: str, result: Mapping[str, Any]) -> tuple[float, float | None, str]:
+    """Value, standard uncertainty and unit of a result in the prefix that reads best."""
+    std = result["std"] if _digits(name, result) is None else None
+    factor, unit_name = _scale(name, result["value"], std, result["unit"])
+    return result["value"] * factor, None if std is None else std * factor, unit_name
+
+
+def _scale(name: str, value: float, std: float | None, unit_name: str) -> tuple[float, str]:
+    """Factor and unit: relative changes in %, outputs with a prefix."""
+    if name.rpartition("/")[2].startswith(("scale-", "improvement-")) and unit_name in RELATIVE:
+        return 100.0, RELATIVE[unit_name]
+    return in_prefix(value, std, unit_name)
 
 
 def _digits(name: str, result: Mapping[str, Any]) -> int | None:
@@ -222,8 +250,3 @@ def _digits(name: str, result: Mapping[str, Any]) -> int | None:
     if SPREADS.search(name):
         return SPREAD_DIGITS
     return TIME_DIGITS if result["unit"] == "h" and not result["std"] else None
-
-
-def _digits_text(result: Mapping[str, Any], digits: int) -> str:
-    factor, prefixed_unit = in_prefix(result["value"], None, result["unit"])
-    return f"{rounded(result['value'] * factor, digits)} {prefixed_unit}".rstrip()

@@ -10,7 +10,7 @@ import pytest
 
 from rig.cli import COMMANDS
 from rig.record import Run
-from rig.services.next_steps import REMEDIES, next_steps, page_steps, results_table
+from rig.services.next_steps import REMEDIES, next_steps, page_steps, result_rows, results_table
 
 RUN = Run("r1", "poses", "sweep", "complete", {}, {}, {}, "", {}, "", "", None, None, {}, 20)
 
@@ -83,13 +83,40 @@ def test_results_are_a_table() -> None:
     both |= {"d": {**result("fail"), "value": -1.0}, "d-tolerance": {**result(None, None), "value": 0.0012345}}
     assert [line.split() for line in results_table(both)] == [
         ["result", "value", "limit", "verdict"],
-        ["a", "1.00(10)", "V", "at", "most", "1", "fail"],
-        ["b", "1.00(10)", "V", "0", "to", "2", "pass"],
+        ["a", "1.00(10)", "V", "at", "most", "1", "V", "fail"],
+        ["b", "1.00(10)", "V", "0", "to", "2", "V", "pass"],
         ["c", "1.00(10)", "V", "-"],
-        ["d", "-1.00(10)", "V", "at", "least", "-1", "fail"],
+        ["d", "-1.00(10)", "V", "at", "least", "-1", "V", "fail"],
         ["d-tolerance", "1.2", "mV", "-"],
     ]
     assert results_table({}) == []
+
+
+def test_a_result_and_its_limit_have_a_unit_that_is_easy_to_read() -> None:
+    def of(value: float, std: float | None, unit: str, limit: object = None) -> dict[str, Any]:
+        return {"value": value, "std": std, "unit": unit, "limit": limit, "verdict": None}
+
+    results = {
+        "noise-pp-x": of(785.5e-6, 7.3e-6, "V", 0.0035),
+        "bias-x": of(2.5, 1e-5, "V", [2.4, 2.6]),
+        "A/scale-temperature-x": of(1.88e-4, 0.21e-4, "1/K", 0.0003),
+        "scale-tolerance-x": of(1.5e-4, None, ""),
+        "scale-drift-x": of(0.0, 1.2e-4, ""),
+        "scale-x": of(1.006169, 2.5e-5, "V/g"),
+        "improvement-x": of(0.97648, 0.00048, "", [0.9, 1]),
+        "rate-residual-z": of(0.00247273, None, "deg/s"),
+    }
+    assert [(row.value, row.limit) for row in result_rows(results)] == [
+        ("785.5(73) µV", "at most 3.5 mV"),
+        ("2.500000(10) V", "2.4 to 2.6 V"),
+        ("0.0188(21) %/K", "at most 0.03 %/K"),
+        ("0.015 %", ""),
+        ("0.000(12) %", ""),
+        ("1.006169(25) V/g", ""),
+        ("97.648(48) %", "90 to 100 %"),
+        ("0.0025 deg/s", ""),
+    ]
+    assert results_table(results)[1].split()[1:] == ["785.5(73)", "uV", "at", "most", "3.5", "mV"]
 
 
 def test_the_steady_state_is_a_sentence_with_times_of_three_digits() -> None:
