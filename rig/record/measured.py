@@ -23,7 +23,7 @@ from rig.errors import RecordError, UnknownRun
 from rig.record import tables
 from rig.record.history import interruptions
 from rig.record.store import Record
-from rig.record.tables import MOST_BLOCKS, inflations, poses_table, samples_table, stated_unit, units_of
+from rig.record.tables import MOST_BLOCKS, inflations, no_poses, poses_table, samples_table, stated_unit, units_of
 from rig.record.turns import turn_columns
 from rig.record.values import CHANGED, KeptPose, Run
 
@@ -86,7 +86,7 @@ def specific_force_g(pose: Pose) -> Array:
 
 def _table(run: Run, recorded: Sequence[KeptPose], outputs: Sequence[str], extra_columns: Mapping[str, Array]) -> Table:
     if not recorded:
-        raise RecordError(f"run {run.run} has no pose yet; `rig resume` continues it")
+        raise no_poses(run)
     rows = [pose.dwell for pose in recorded]
     columns = dict(extra_columns) | {"t_s": np.array([pose.t_s for pose in recorded])}
     if all(pose.temperature_c is not None for pose in recorded):

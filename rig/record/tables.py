@@ -175,7 +175,7 @@ def poses_table(run: Run, poses: Iterable[KeptPose]) -> Table:
         if number % stride == 0:
             blocks.append(recorded.samples)
     if not rows:
-        raise RecordError(f"run {run.run} has no pose yet; `rig resume` continues it")
+        raise no_poses(run)
     names = [name for name in rows[0] if all(name in row for row in rows)]
     columns = {name: np.array([row[name] for row in rows]) for name in names}
     labels = {"path": tuple(paths)} if any(paths) else {}
@@ -184,6 +184,13 @@ def poses_table(run: Run, poses: Iterable[KeptPose]) -> Table:
     constants |= inflations(blocks)
     table = Table.from_columns(run.kind, _useful(columns), constants, run.run, labels)
     return replace(table, numbers=np.array(numbers))
+
+
+def no_poses(run: Run) -> RecordError:
+    """The error of a run from which no table can be made: it has not begun, or its procedure measures no poses."""
+    if run.state == "complete":
+        return RecordError(f"run {run.run} has no poses; `rig show {run.run}` shows its results")
+    return RecordError(f"run {run.run} has no pose yet; `rig resume` continues it")
 
 
 def _row(recorded: KeptPose, units: Mapping[str, str]) -> dict[str, float]:

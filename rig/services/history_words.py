@@ -35,8 +35,10 @@ def next_due(life: History, limit_is_given: str) -> str:
 
 def closest_text(calibration: Calibration, age_days: float, on: date) -> str:
     """The calibration closest to a day, and its distance in days."""
+    count = round(abs(age_days))
     side = "before" if age_days >= 0 else "after"
-    return f"Closest to {on}: {calibration.data}, {calibration.day}, {abs(age_days):.0f} days {side}."
+    distance = f"{count} day{'s' * (count > 1)} {side}" if count else "the same day"
+    return f"Closest to {on}: {calibration.data}, {calibration.day}, {distance}."
 
 
 def but_stale(reason: str) -> str:

@@ -16,8 +16,9 @@ from nicegui.events import GenericEventArguments, KeyEventArguments
 from rig.errors import RigError
 from rig.runs.background import control
 from rig.runs.background.status import Status
+from rig.services.page_words import page_step
 from rig.web.desk import Desk, lab_read
-from rig.web.parts import button, dialog_with_name, message
+from rig.web.parts import button, dialog_with_name, for_page, message
 
 # The present run in the head of every page: progress, pause and stop.
 
@@ -81,10 +82,11 @@ def news(previous: Status | None, present: Status) -> tuple[str, str] | None:
         return None
     if present.phase == "asking" and present.asked is not None:
         return f"{present.procedure} asks you", present.asked.text
+    error = for_page(page_step(present.error).text)  # the commands of a terminal are buttons of the page
     if present.phase == "paused":
-        return f"{present.procedure} is paused", present.error or "Continue it or stop it on the page Run."
+        return f"{present.procedure} is paused", error or "Continue it or stop it on the page Run."
     if present.phase == "ended" and same_run:
-        return f"{present.procedure}: {present.state or 'ended'}", f"{present.run} {present.error}".strip()
+        return f"{present.procedure}: {present.state or 'ended'}", ": ".join(filter(None, (present.run, error)))
     return None
 
 

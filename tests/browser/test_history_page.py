@@ -39,6 +39,7 @@ def test_the_check_standard_has_its_charts(workbench: Workbench) -> None:
     expect(page.get_by_text(f"{names[-1]}: CS-1 bias-x is")).to_be_visible()
     for title, count in (("Single runs", 21), ("Change from run to run", 20)):
         dots(page, f"Check standard: {title}", count)
+    expect(page.locator("[aria-label='Check standard: Single runs'] .xtitle")).to_have_text("run")
     workbench.shot(page, "check-standard")
     workbench.fits(page)
     page.get_by_role("button", name="Measure the check standard").click()
@@ -126,6 +127,8 @@ def test_what_is_asked_is_in_the_address_and_on_the_keys(workbench: Workbench, r
     expect(page.locator("body.body--dark")).to_be_attached()
     workbench.shot(page, "history-dark")
     workbench.fits(page)
+    label = page.get_by_text("Largest change of bias-y (V)")
+    assert label.evaluate("label => label.scrollWidth <= label.clientWidth")  # not cut
     workbench.shot(page, "history-tablet")
     page.get_by_label("Light or dark").click()
 
@@ -163,6 +166,13 @@ def test_two_days_two_rigs_and_another_sensor_are_compared(workbench: Workbench,
     compare.click()
     both = page.get_by_role("link", name="One model fitted to both")
     expect(both).to_have_attribute("href", f"/compare?first={runs[0]}&second={runs[-1]}&model=linear")
+
+
+def test_runs_that_are_not_used_have_a_reason_without_commands(workbench: Workbench, runs: list[str]) -> None:
+    (name,) = checks([2.5], {"sensor": {"serial": "17"}})
+    page = workbench.visit("/history?sensor=17")
+    page.get_by_text("1 run not used").click()
+    expect(page.get_by_text(f"run {name} has no poses; the page Record shows its results")).to_be_visible()
 
 
 def test_what_cannot_be_shown_and_what_to_do(workbench: Workbench, runs: list[str]) -> None:

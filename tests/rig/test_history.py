@@ -71,6 +71,8 @@ def test_the_document_of_a_history_has_its_figures(rig: Rig, years: None) -> Non
 def test_the_closest_to_a_day_and_whether_it_is_stale(rig: Rig, years: None) -> None:
     fresh = rig("history", "17", "--at", "2022-05-01")
     assert (fresh.status, "Closest to 2022-05-01" in fresh.out, "61 days before" in fresh.out) == (0, True, True)
+    near = [rig("history", "17", "--at", f"2022-03-0{day}").out for day in (1, 2)]
+    assert [end in out for end, out in zip((", the same day.", ", 1 day before."), near, strict=True)] == [True, True]
     old = rig("history", "17", "--at", "2026-01-01")
     assert old.status == 1
     assert "This calibration is stale: it is 671 days older than that day." in old.out

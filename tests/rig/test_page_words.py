@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from rig.files import home
 from rig.record import Record
+from rig.runs.background.status import Status
 from rig.services.next_steps import result_rows
 from rig.services.page_words import page_step
 from rig.services.tables import with_run_ids
+from rig.web.frame import news
 from rig.web.parts import for_page, with_labels
 
 SUGGESTED = (
@@ -25,6 +28,11 @@ SUGGESTED = (
             "run 7 has no pose yet; `rig resume` continues it",
             "run 7 has no pose yet; the page Run continues it",
             {"Run": "/run"},
+        ),
+        (
+            "run 7 has no poses; `rig show 7` shows its results",
+            "run 7 has no poses; the page Record shows its results",
+            {"Record": "/record"},
         ),
         (
             "give a still record; `rig run noise-floor` or `rig run soak` makes one",
@@ -51,6 +59,17 @@ def test_a_page_is_named_in_place_of_its_command(line: str, text: str, to: dict[
 def test_the_unit_is_named_in_place_of_its_option(golden) -> None:
     line = 'the column "vx_v" reaches 2500 V\nIf its unit is mV, import it with:\n\n    rig import x.csv --column vx_v=U:mV\n\nIf its unit is V after all, state it: --column vx_v=U:V'  # noqa: E501
     golden.same(page_step(line).text)
+
+
+def test_a_notification_has_no_commands() -> None:
+    running = Status("k", 1, "soak", "a rig", phase="running", run="r1")
+    error = "stopped by a person (SIGINT); `rig resume r1` continues the run"
+    ended = replace(running, phase="ended", state="stopped", error=error)
+    told = "r1: stopped by a person (SIGINT); the page Run continues the run"
+    assert news(running, ended) == ("soak: stopped", told)
+    assert news(running, replace(ended, phase="paused")) == ("soak is paused", told.removeprefix("r1: "))
+    assert news(running, replace(ended, state="complete", error="")) == ("soak: complete", "r1")
+    assert news(running, running) is None
 
 
 def _result(value: float, limit: object = None, std: float | None = None) -> dict[str, object]:

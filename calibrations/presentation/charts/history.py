@@ -137,7 +137,7 @@ def control_panels(
         EWMA: (1, chart.ewma - chart.centre, -slow, slow, chart.drifts, judged_from, change, chart.verdict),
         RANGES: (2, chart.ranges, 0 * limit, limit, (), judged_from - 1, "range", ""),
     }
-    x = Axis("calibration", low=0.5, high=len(chart.values) + 0.5, ticks="integers")
+    x = Axis("run", low=0.5, high=len(chart.values) + 0.5, ticks="integers")
     panels = {}
     for title, (first, values, low, high, signals, baseline_end, label, remark) in parts.items():
         factor, spelt = add_prefix(unit(unit_name), float(np.abs([values, high]).max()))

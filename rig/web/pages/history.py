@@ -24,6 +24,7 @@ from rig.services.history import (
     run_date,
     type_of,
 )
+from rig.services.page_words import page_step
 from rig.services.request import effects_of
 from rig.web.calculations import Visit, off_loop
 from rig.web.desk import Desk, models, runs
@@ -39,7 +40,7 @@ from rig.web.pages.history_results import (
     quantities_table,
     summary_of,
 )
-from rig.web.parts import LINKED, afresh, box, button, div, show_error, shown, sortable, state, words
+from rig.web.parts import LINKED, afresh, box, button, div, for_page, show_error, shown, sortable, state, words
 
 # The list of sensors.
 
@@ -137,6 +138,7 @@ class HistoryPage:
                 "dense options-dense"
             )
             self.limit = ui.number("Largest change", min=0, on_change=self._change_limit).props("dense debounce=300")
+            self.limit.style("min-width: 230px")  # its label has the name and the unit of the quantity
             self.baseline = ui.number(
                 "Chart baseline (calibrations)",
                 value=request.baseline,
@@ -189,7 +191,7 @@ class HistoryPage:
                 count = len(history.passed_over)
                 with ui.expansion(f"{count} run{'s' * (count > 1)} not used").props("dense").classes("box"):
                     for data, reason in history.passed_over.items():
-                        words(f"{data}: {reason}", "small")
+                        words(for_page(page_step(f"{data}: {reason}").text), "small")
         self.keys["q"] = Key("next quantity", self._next_quantity)
         self.keys["d"] = Key("calibration closest to a day", self.closest.focus)
 
