@@ -18,8 +18,14 @@ def plan_rows(optimum: Optimal) -> list[tuple[str, ...]]:
         ("poses", *(str(candidate.plan.poses) for candidate in plans)),
         ("dwell", *(f"{candidate.dwell_s:g} s" for candidate in plans)),
         ("rig time", *(duration(candidate.plan.duration_s) for candidate in plans)),
-        ("worst standard error", *(_percent(relative(optimum.standard, candidate)) for candidate in plans)),
-        ("candidate error, at most", *(_percent(most_relative(optimum.standard, candidate)) for candidate in plans)),
+        (
+            "worst standard error, relative to the sweep",
+            *(_percent(relative(optimum.standard, candidate)) for candidate in plans),
+        ),
+        (
+            "any standard error, relative to the sweep, at most",
+            *(_percent(most_relative(optimum.standard, candidate)) for candidate in plans),
+        ),
     ]
 
 

@@ -123,6 +123,7 @@ def test_people_are_told_what_it_saves_and_how_to_run_it() -> None:
     text = "\n".join(optimal_lines(chosen("physical"), None))
     assert "physical, 16 parameters: I-optimal poses" in text
     assert "times less rig time for the same worst standard error" in text
+    assert "any standard error, relative to the sweep, at most" in text
     assert f"rig run sweep --pose-list poses.csv --dwell-s {chosen('physical').equal.dwell_s:g}" in text
 
 
