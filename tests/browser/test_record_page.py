@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 import numpy as np
@@ -104,3 +105,15 @@ def test_a_run_is_exported_and_reported(workbench: Workbench, runs: list[str], t
     with page.expect_download() as report:
         page.get_by_role("button", name="Report").click()
     assert "misses axis-misalignment" in Path(report.value.path()).read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_a_run_that_is_not_complete_is_called_so_once(workbench: Workbench) -> None:
+    about: dict[str, Any] = {"bench": {"seed": 1}, "identities": {}, "configuration": "", "source": "a bench"}
+    with Record() as record:
+        name = record.begin("soak", {}, constants={"sensor": "ADXL203"}, **about)
+        record.set_state(name, "stopped", "stopped by a person")
+    page = workbench.visit(f"/record/{name}")
+    expect(page.get_by_text("The run is not complete")).to_have_text(
+        ["The run is not complete. Resume it on the page Run."]
+    )

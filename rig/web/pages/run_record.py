@@ -332,8 +332,8 @@ class OneRun:
 
 def _results(run: Run) -> None:
     if not run.results:
-        results_text = "The results are in the report below." if run.rows else "There are no results."
-        words(results_text if run.state == "complete" else "The run is not complete.", "quiet")
+        if run.state == "complete":  # else a step says so
+            words("The results are in the report below." if run.rows else "There are no results.", "quiet")
         return
     with ui.element("table").classes("plain-table results"):
         for row in result_rows(run.results):
