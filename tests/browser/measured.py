@@ -43,6 +43,16 @@ def two_faults(folder: Path) -> str:
     return _written(folder, "two-faults", {"alpha_deg": alpha, "beta_deg": beta, "vx_v": vx, "vy_v": vy})
 
 
+def scattered(folder: Path) -> str:
+    """24 poses that scatter by far more than the noise of their means."""
+    rng = np.random.default_rng(5)
+    alpha, beta = np.full(24, 90.0), np.tile(np.arange(0.0, 360.0, 45.0), 3)
+    load = np.array([np.cos(np.radians(beta)), np.sin(np.radians(beta))])
+    vx, vy = 2.5 + load + 5e-3 * rng.standard_normal(load.shape)
+    noise = {"vx_std_v": np.full(24, 1e-3), "vy_std_v": np.full(24, 1e-3), "n": np.full(24, 1000.0)}
+    return _written(folder, "scattered", {"alpha_deg": alpha, "beta_deg": beta, "vx_v": vx, "vy_v": vy, **noise})
+
+
 def ambiguous(folder: Path) -> str:
     """Poses of a sensor that is turned about z, which a stage's zero explains as well."""
     config = IDEAL.changed({"sensor": {"package": {"turn_z_deg": 0.05}}})

@@ -20,7 +20,7 @@ from rig.record import KeptPose, Record
 from rig.runs.runner import resume, start
 from tests.browser.conftest import Workbench
 from tests.browser.held import held_up
-from tests.browser.measured import hidden, hundred_thousand, thousand, two_faults, unexplained, wandering
+from tests.browser.measured import hidden, hundred_thousand, scattered, thousand, two_faults, unexplained, wandering
 
 pytestmark = pytest.mark.slow
 
@@ -110,6 +110,19 @@ def test_an_effect_of_ones_own_with_a_mistake_and_then_right(workbench: Workbenc
     expect(page.get_by_role("button", name="Undo my-worm")).to_be_enabled()
 
 
+def tops(page: Page, *parts: str) -> list[float]:
+    """The upper ends of the first of these parts."""
+    boxes = [page.locator(part).first.bounding_box() for part in parts]
+    return [place["y"] for place in boxes if place is not None]
+
+
+def test_the_own_effect_is_below_the_candidates_where_it_has_no_proposal(workbench: Workbench, tmp_path: Path) -> None:
+    page = looked_at(workbench, scattered(tmp_path), "No effect of the catalogue explains the residual: scatter")
+    expect(page.get_by_text("Write your own effect below.")).to_be_visible()
+    own, card = tops(page, ".own", ".card")
+    assert own > card
+
+
 def test_of_a_still_record_the_allan_deviation_is_shown(workbench: Workbench, tmp_path: Path) -> None:
     page = looked_at(workbench, wandering(tmp_path), "misses rate-random-walk")
     for picture in ("Allan deviation and model", "Spectrum and model", "Residual pattern"):
@@ -117,7 +130,7 @@ def test_of_a_still_record_the_allan_deviation_is_shown(workbench: Workbench, tm
     expect(page.get_by_role("button", name="with rate-random-walk")).to_be_visible()  # its curve is drawn
     expect(page.locator(".card.first")).to_contain_text("× chance")
     label = page.locator("[aria-label='Allan deviation and model'] .ytitle")
-    expect(label).to_have_text("Allan deviation (V)")
+    expect(label).to_have_text("Allan deviation (mV)")
     page.keyboard.press("g")
     expect(label).to_have_text("Allan deviation (mg)")
     expect(page.locator("[aria-label='Spectrum and model'] .ytitle")).to_have_text("density (mg/√Hz)")

@@ -44,7 +44,7 @@ from calibrations.presentation.chart import (
 from calibrations.presentation.charts.discovery import Measure, model_levels, waterfall
 from calibrations.spectrum import GAUSS_MARKOV
 from calibrations.table import MILLI, Array, in_time
-from calibrations.text import rounded
+from calibrations.text import in_milli, rounded
 
 POINTS = 160
 HEIGHT = 3.8
@@ -84,11 +84,16 @@ class ModelCurve:
     dash: Dash = "solid"
 
 
+def output_scale(unit_name: str) -> Scaling:
+    """Thousandths of the unit of an output, because noise is small."""
+    return Scaling(*in_milli(unit_name))
+
+
 def choose_scale(still: Still, axis: str, in_sensed: bool) -> Scaling:
-    """The output's own unit; or thousandths of the sensed quantity, because noise is small."""
+    """Thousandths of the output's unit or of the sensed quantity, because noise is small."""
     sensed = still.sensed.get(axis)
     if sensed is None or not in_sensed:
-        return Scaling(1.0, still.unit)
+        return output_scale(still.unit)
     if sensed.unit not in MILLI:
         return Scaling(sensed.factor, sensed.unit)
     return Scaling(1e3 * sensed.factor, MILLI[sensed.unit])
@@ -198,7 +203,7 @@ def steps_chart(start: NoiseFit, steps: Sequence[Step[NoiseFit]]) -> Chart:
 
 def fit_chart(fit: NoiseFit) -> Chart:
     """The measured Allan deviation of each channel, and that of the model."""
-    scaled = Scaling(1.0, fit.still.unit)
+    scaled = output_scale(fit.still.unit)
     curves = (fit.still.allan[channel.channel.axis] for channel in fit.channels)
     curves_by_channel = ([ModelCurve(channel, fit.model.name, INK)] for channel in fit.channels)
     return _with_axis_titles(
@@ -237,7 +242,7 @@ def still_album(end: NoiseFit, start: NoiseFit) -> list[Picture]:
         f"grey band holds 95 % of them by the model {name}{dashed}."
     )
     curves, densities = [], []
-    scaled = Scaling(1.0, end.still.unit)
+    scaled = output_scale(end.still.unit)
     for end_fit, start_fit in zip(end.channels, start.channels, strict=True):
         axis = end_fit.channel.axis
         models = [ModelCurve(end_fit, _name(end, start), INK)]
@@ -292,7 +297,7 @@ def noise_album(analysis: NoiseAnalysis) -> list[Picture]:
     album = []
     for k, (axis, noise) in enumerate(analysis.channels.items()):
         end, of_axis = (f"-{axis}", f" of {axis}") if k else ("", "")
-        model, scaled = _present_processes(noise), Scaling(1.0, noise.unit)
+        model, scaled = _present_processes(noise), output_scale(noise.unit)
         density = single_chart(spectrum(model.fit, scaled, [model], noise.interval), 4.0)
         album.append(Picture(f"allan{end}", f"Allan deviation{of_axis}", averaging, _deviations(noise, model, scaled)))
         album.append(Picture(f"spectrum{end}", f"Spectrum{of_axis}", power, density))
@@ -313,15 +318,18 @@ def _deviations(noise: ChannelNoise, model: ModelCurve, scaled: Scaling) -> Char
     left_panel = replace(
         panel, y=replace(panel.y, label=f"deviation ({scaled.unit})"), title="Overlapping Allan deviation"
     )
-    curves = [part for kind, name, colour in OTHERS for part in _other_deviation(noise.deviations[kind], name, colour)]
-    line = Line(curve.tau_s, curve.deviation, "overlapping Allan", QUIET)
+    curves = [
+        part for kind, name, colour in OTHERS for part in _other_deviation(noise.deviations[kind], scaled, name, colour)
+    ]
+    line = Line(curve.tau_s, scaled.factor * curve.deviation, "overlapping Allan", QUIET)
     right_panel = Panel((*curves, line), Axis(TIME, log=True), left_panel.y, "Other deviations", legend="upper center")
     return side_by_side([left_panel, right_panel], 4.0, share_y=True)
 
 
-def _other_deviation(curve: Curve, name: str, colour: str) -> tuple[Band, Line]:
-    band = Band(curve.tau_s, curve.low, curve.high, colour=colour, opacity=0.18)
-    return band, Line(curve.tau_s, curve.deviation, name, colour, markers=True)
+def _other_deviation(curve: Curve, scaled: Scaling, name: str, colour: str) -> tuple[Band, Line]:
+    factor = scaled.factor
+    band = Band(curve.tau_s, factor * curve.low, factor * curve.high, colour=colour, opacity=0.18)
+    return band, Line(curve.tau_s, factor * curve.deviation, name, colour, markers=True)
 
 
 def _mark_frequency(frequency_hz: float) -> Iterator[Rule | Note]:

@@ -166,7 +166,8 @@ class Missing:
     def _show_nothing_to_add(self, result: Diagnosis[Any]) -> None:
         is_adequate = result.verdict is Verdict.ADEQUATE
         with box("verdict good" if is_adequate else "verdict doubt"):
-            hint = " Write your own effect above." if self.own.box.visible and result.residual_structure else ""
+            place = "above" if self.own.proposed else "below"
+            hint = f" Write your own effect {place}." if self.own.box.visible and result.residual_structure else ""
             words(
                 "Save the model, or see the candidates below."
                 if is_adequate
@@ -297,6 +298,7 @@ class OwnEffect:
         self.page, self.turn = page, 0
         self.step: Step[Any] | None = None
         self.proposal = ""
+        self.proposed = False  # the box is then above the candidates
         with box("own") as self.box:
             words("Your own effect", "title")
             self.hint = words("", "quiet small")
@@ -321,7 +323,7 @@ class OwnEffect:
         self.add.disable()
         self.fault.set_text("")
         self.fall.set_text("")
-        proposed = pattern is not None and bool(pattern.expression)
+        self.proposed = proposed = pattern is not None and bool(pattern.expression)
         self.box.classes(add="proposed" if proposed else "", remove="" if proposed else "proposed")
         self.hint.set_text("This expression fits the remaining error. Test it, or write another." if proposed else "")
         self.proposal = pattern.expression if pattern is not None and proposed else ""
