@@ -77,7 +77,7 @@ class Desk:
 
     def keep(self, data: str, model: str, session: ModelSession[Any], noise: str = "") -> None:
         """Store the present state of a session, without the note on a change that its page has shown."""
-        self.sessions[data, model, noise] = replace(session, change="")
+        self.sessions[data, model, noise] = replace(session, change="") if session.change else session
         self.sessions.move_to_end((data, model, noise))
         while len(self.sessions) > MOST_OPEN:
             self.sessions.popitem(last=False)
