@@ -69,9 +69,11 @@ def searches() -> list[threading.Thread]:
 @pytest.mark.parametrize("closed", [True, False])
 def test_a_closed_page_ends_its_search(closed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RIG_HOME", str(tmp_path / "home"))
-    data, desk, go, iterate = two_faults(tmp_path), Desk(DEFAULT), threading.Event(), CountedEffects.__iter__
+    data, desk, iterate = two_faults(tmp_path), Desk(DEFAULT), CountedEffects.__iter__
+    begun, go = threading.Event(), threading.Event()
 
     def held(effects: CountedEffects) -> Iterator[str]:
+        begun.set()
         assert go.wait(60)
         yield from iterate(effects)
 
@@ -81,11 +83,14 @@ def test_a_closed_page_ends_its_search(closed: bool, tmp_path: Path, monkeypatch
         async with without_browser() as user:
             register(desk)
             client = await user.open(f"/?data={quote(data)}&model=linear")
-            await user.should_see("Searching for missing effects", retries=200)
-            [search] = searches()
-            if closed:
-                client.delete()
-            go.set()
+            try:
+                await user.should_see("Searching for missing effects", retries=200)
+                assert await asyncio.to_thread(begun.wait, 60)
+                [search] = searches()
+                if closed:
+                    client.delete()
+            finally:
+                go.set()
             await asyncio.to_thread(search.join)
 
     asyncio.run(simulated())
