@@ -21,13 +21,6 @@ LEAST_BESIDE_LOOPS = 0.1  # of the size of a hysteresis in another form, of whic
 LEAST_UNKNOWN = 1.0  # noise floors: size of a place whose cause is unknown
 LEAST_UNKNOWN_SHARE = 0.05  # of the largest place's size: the part of such a place that no other one explains
 READING_ERRORS = 1.5  # times the residual by the errors of noisy columns, whose size is uncertain
-DEFINED_BY_PLACE = {
-    "temperature-bias": "temperature-bias",
-    "temperature-scale": "temperature-scale",
-    "column:supply_v": "supply-sensitivity",
-    "column:std": "vibration-rectification",
-    "output": "adc-nonlinearity",
-}  # effects of which any curve at the place is a form: they say what the output depends on, not how
 CANCELLED = 3.0  # of what the base leaves: a larger place is cancelled by another one, and neither has the true curve
 FORM_OF = 0.25  # of another place's size: a place of which no more is its own may be a part of that place's form
 HISTORY = "history"
@@ -117,11 +110,9 @@ def _acting_place(
     least_own = min(LEAST_SIZE, max(LEAST_OWN, _excess(result))) if causes else LEAST_SIZE
     material = own >= least_own and size >= max(least_own, least)
     curve = curves[place].reshape(result.white.shape) * result.white
-    acting_place = ActingPlace(
+    return ActingPlace(
         place, size, own, largest, tuple(names), causes, share, material, gain, alternatives, curve, constants
     )
-    defined = acting_place.unknown and place in DEFINED_BY_PLACE and not _is_cancelled(result, curves[place])
-    return replace(acting_place, causes=(DEFINED_BY_PLACE[place],)) if defined else acting_place
 
 
 def _least_size(result: SearchResult, place: str, sizes: PlaceSizes) -> float:
