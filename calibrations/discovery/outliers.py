@@ -63,15 +63,14 @@ def _may_reach_limit(complete: Fit, rows: NDArray[np.intp]) -> bool:
     chance = (len(expected) / complete.table.n) ** len(rows)
     if not len(rows) or chance >= SIGNIFICANT:
         return False
-    highest, lowest = np.argmax(expected, axis=1), np.argmin(expected, axis=1)
-    return all(
-        any(
-            (row == highest[k] and complete.residual[k, row] < 0)
-            or (row == lowest[k] and complete.residual[k, row] > 0)
-            for k in range(len(expected))
-        )
-        for row in rows
-    )
+    channels = zip(expected, complete.residual, strict=True)
+    ends = {
+        int(end)
+        for values, residual in channels
+        for end, inward in ((np.argmax(values), -1), (np.argmin(values), 1))
+        if inward * residual[end] > 0
+    }
+    return ends.issuperset(map(int, rows))
 
 
 def _nearest(directions: Array) -> NDArray[np.intp]:

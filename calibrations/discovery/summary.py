@@ -126,9 +126,9 @@ def certainty_of(c: Candidate) -> str:
 
 
 def probability_text(c: Candidate) -> str:
-    """The probability of a candidate among all: never 0 or 100 %; a candidate that is not significant has none."""
+    """The probability of a candidate among all: never 0 or 100 %; "" for a candidate that is not significant."""
     if c.p_value >= SIGNIFICANT:
-        return "-"
+        return ""
     percent = 100 * c.probability
     return "> 99.9 %" if percent > 99.9 else "< 0.1 %" if percent < 0.1 else f"{percent:.3g} %"
 

@@ -1,4 +1,7 @@
-"""Places that act in the data: their curves, sizes and causes, and what the data cannot separate from them."""
+"""Finds the places at which an effect acts, and the curve, the size and the causes of each.
+
+A place also lists the effects that the data cannot separate from its causes.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ from scipy.special import chdtrc  # scipy.stats takes 0.4 s to load
 from calibrations.free_forms.descent import SearchResult
 from calibrations.free_forms.jumps import STEPS
 from calibrations.free_forms.naming import Curves, all_walk, causes_of_place, project_off
+from calibrations.free_forms.place_names import HISTORY
 from calibrations.free_forms.rivals import gain_and_rivals, replacements_of
 from calibrations.table import Array
 
@@ -23,7 +27,6 @@ LEAST_UNKNOWN_SHARE = 0.05  # of the largest place's size: the part of such a pl
 READING_ERRORS = 1.5  # times the residual by the errors of noisy columns, whose size is uncertain
 CANCELLED = 3.0  # of what the base leaves: a larger place is cancelled by another one, and neither has the true curve
 FORM_OF = 0.25  # of another place's size: a place of which no more is its own may be a part of that place's form
-HISTORY = "history"
 
 PlaceSizes = Mapping[str, float]  # of each place, rms in noise floors
 

@@ -22,6 +22,7 @@ PLACES = {
     "output": "output of all axes over the output itself: the converter",
 }  # and column:NAME, a logged column
 KINDS_OF_FORMS = ("poses", "positions", "motion")  # of data, that can show a free form
+HISTORY = "history"
 GEOMETRY_PLACE = "geometry"  # a matrix and two angles: no free form, but a search can leave it out
 AT_REST = ("temperature-bias", "time-bias")  # and column:NAME: what one orientation shows
 EFFECTS_AT = {

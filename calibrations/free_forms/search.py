@@ -17,6 +17,7 @@ import numpy as np
 from calibrations.free_forms.chain import ModelEffects
 from calibrations.free_forms.descent import CONVERGED, SLOW_MOST, SearchResult, Setting, descend, take_damped_step
 from calibrations.free_forms.jumps import STEPS
+from calibrations.free_forms.place_names import HISTORY
 from calibrations.free_forms.places_in_time import slow_noise
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.reml import coefficients, estimate, gram
@@ -76,7 +77,7 @@ def _search_from_all(setting: Setting, general: bool, reason: str) -> SearchResu
     best = min(effects_first, together, key=lambda end: end.criterion)
     if setting.flicker and best.ratio > MOST_MISFIT:
         return best  # flicker of any size does not describe the misfit that it was tried for
-    if any(best.component(name).place == "history" for name in best.active):
+    if any(best.component(name).place == HISTORY for name in best.active):
         looped = descend(setting, general, f"{reason}with loops", catalogue_first=True, loops=True)
         best = looped if looped.criterion < best.criterion - SPILL * abs(best.criterion) else best
     if best.ratio >= NOISE_ALONE and setting.first_jumps is not None:

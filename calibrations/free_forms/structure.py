@@ -18,7 +18,7 @@ from calibrations.free_forms.chain import Coefficients, ModelEffects
 from calibrations.free_forms.descent import SearchResult
 from calibrations.free_forms.form import CROSS, Form
 from calibrations.free_forms.geometry import LINEAR_PART, Geometry, GeometryEffects, geometry
-from calibrations.free_forms.place_names import place_of_effect
+from calibrations.free_forms.place_names import HISTORY, place_of_effect
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.search import NOISE_ALONE, search
 from calibrations.free_forms.selection import ENTER
@@ -80,7 +80,7 @@ class Structure:
 
     def _follows(self, place: ActingPlace) -> bool:
         """Whether a place acts by components that follow many things: branches, slip elements, a random walk."""
-        return place.name == "history" or any("/walk-" in name for name in place.components)
+        return place.name == HISTORY or any("/walk-" in name for name in place.components)
 
     def _is_confounded(self, cause: str, cause_names: list[str]) -> bool:
         """Whether the data cannot separate a cause from one of those that are named, or from its place."""

@@ -117,12 +117,18 @@ def test_a_run_of_a_terminal_is_watched_and_stopped(workbench: Workbench) -> Non
     assert terminal.returncode == 4
 
 
-def test_questions_are_asked_and_a_wrong_answer_is_refused(workbench: Workbench) -> None:
+def asked(workbench: Workbench) -> Page:
+    """A run on a simulated rig that asks a person to turn the sensor over."""
     page = workbench.visit("/run?procedure=sweep&step_deg=180&inclinations_deg=90&face=both")
     expect(page.get_by_text("Takes", exact=True)).to_be_visible()
     page.get_by_text("Ask me").click()
     begin(page)
     phase(page, "asks you")
+    return page
+
+
+def test_questions_are_asked_and_a_wrong_answer_is_refused(workbench: Workbench) -> None:
+    page = asked(workbench)
     expect(page.locator(".question")).to_contain_text("face down")  # the first mounting was one of the checks
     expect(page).to_have_title(re.compile(r"❗ \d+ % sweep asks you"))
     workbench.shot(page, "question")
@@ -234,11 +240,7 @@ def test_a_run_begins_after_the_checks_and_no_single_key_moves_anything(workbenc
 
 
 def test_a_run_that_asks_a_person_does_so_after_a_resume(workbench: Workbench) -> None:
-    page = workbench.visit("/run?procedure=sweep&step_deg=180&inclinations_deg=90&face=both")
-    expect(page.get_by_text("Takes", exact=True)).to_be_visible()
-    page.get_by_text("Ask me").click()
-    begin(page)
-    phase(page, "asks you")
+    page = asked(workbench)
     page.get_by_role("button", name="Stop").first.click()
     phase(page, "stopped")
     page.get_by_role("button", name="Resume").click()

@@ -7,11 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from calibrations.discovery.results import Discovery
 from calibrations.free_forms.acting_places import _least_size
 from calibrations.loop import discover
 from calibrations.model.file import read_model
-from calibrations.table import Array
 from tests.calibrations.synthetic import components, poses, turns
 
 COLUMNS = turns((90, 30, 150), step_deg=15.0)
@@ -19,16 +17,12 @@ ROWS = len(COLUMNS["t_s"])
 SHARE = np.arange(ROWS) / ROWS
 
 
-def found(added: Array) -> Discovery:
-    """Causes of a linear sensor with `added` (n,) in one output and, of the other sign, in the other one."""
-    x, y, _ = components(COLUMNS)
-    return discover(poses(COLUMNS, 2.5 + x + added, 2.5 + y - 0.7 * added), read_model("linear"))
-
-
 @pytest.mark.parametrize(("fast", "slow"), [(0.05, 0.2), (0.08, 0.3)])
 def test_a_warm_up_of_two_masses_of_opposite_sign_is_a_warm_up(fast: float, slow: float) -> None:
     """One exponential explains it no better than a drift does."""
-    result = found(3e-3 * (np.exp(-SHARE / fast) - np.exp(-SHARE / slow)))
+    x, y, _ = components(COLUMNS)
+    heating = 3e-3 * (np.exp(-SHARE / fast) - np.exp(-SHARE / slow))
+    result = discover(poses(COLUMNS, 2.5 + x + heating, 2.5 + y - 0.7 * heating), read_model("linear"))
     assert result.causes == ("warm-up-bias",)
     assert result.end.pooled_excess < 1.2
 

@@ -291,7 +291,7 @@ def _candidates(discovery: Discovery[Fit]) -> tuple[Block, ...]:
             rounded(c.excess_after),
             rounded(c.held_out_after),
             probability(c.p_value),
-            probability_text(c),
+            probability_text(c) or "–",
             ", ".join(c.indistinguishable_from) or "–",
         )
         for c in candidates

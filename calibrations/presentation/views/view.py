@@ -76,7 +76,7 @@ def candidate_cells(
             f"{diagnosis.held_out_before:.3g} -> {c.held_out_after:.3g}",
             *((f"{c.gain / 2:.4g}" if c.gain > 1e-6 else "0",) if gains else ()),
             "yes" if c.p_value < SIGNIFICANT else "no",
-            probability_text(c),
+            probability_text(c) or "-",
             ", ".join(c.indistinguishable_from) or "-",
         )
         for c in candidates
