@@ -7,7 +7,8 @@ from functools import partial
 
 import numpy as np
 import scipy  # its room of optimization is loaded where it is first entered
-from scipy.linalg import lstsq, qr
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, lstsq, qr
 
 from calibrations.fitting.identifiability import RELATIVE_RANK
 from calibrations.fitting.problem import Problem
@@ -121,8 +122,10 @@ def newton_step(
     # a rotation of the rows changes no step, and leaves as many rows as columns for every damping
     rotated = qr(np.column_stack([J, residual]), mode="r", overwrite_a=True, check_finite=False)[0]
     R: Array = np.asarray(rotated[: J.shape[1] + 1], dtype=np.float64)
+    squares = R[:, :-1].T @ R
     for damping in DAMPINGS:
-        candidate = theta + typical * _step(R[:, :-1], R[:, -1], damping, low, high)
+        solve = partial(_damped, squares, damping) if damping else partial(_shortest, R)
+        candidate = theta + typical * _within(solve, low, high)
         least = white(candidate)
         if float(residual @ residual - least @ least) > 0:
             return candidate, least
@@ -142,21 +145,42 @@ def _reach(layout: Layout, theta: Array) -> tuple[Array, Array]:
     )
 
 
-def _step(J: Array, residual: Array, damping: float, low: Array, high: Array) -> Array:
-    """The damped step within bounds: an entry that a step takes beyond its bound goes there, and no farther."""
-    step = np.zeros(J.shape[1])
+def _within(solve: Callable[[Array, NDArray[np.bool_]], Array], low: Array, high: Array) -> Array:
+    """The step within bounds: an entry that a step takes beyond its bound goes there, and no farther.
+
+    solve  the entries of the step that are free, (k,), beside a step (p,) of the others
+    """
+    step = np.zeros(len(low))
     free = np.ones(len(step), dtype=bool)
     for _ in range(BOUND_ROUNDS):
-        columns, side = J[:, free], residual + J[:, ~free] @ step[~free]
-        size = np.linalg.norm(columns, axis=0)
-        most = size.max(initial=0.0) or 1.0
-        damped = np.vstack([columns / most, np.diag(np.sqrt(damping) * size / most)]) if damping else columns / most
-        # by orthogonal factors: singular values need not converge on free forms of hundreds of columns
-        side = np.append(-side / most, np.zeros(len(damped) - len(side)))
-        step[free] = lstsq(damped, side, cond=RELATIVE_RANK, lapack_driver="gelsy", check_finite=False)[0]
+        step[free] = solve(step, free)
         out_of_bounds = free & ((step < low) | (step > high))
         if not out_of_bounds.any():
             break
         step = np.clip(step, low, high)
         free &= ~out_of_bounds
     return np.asarray(np.clip(step, low, high))
+
+
+def _shortest(R: Array, step: Array, free: NDArray[np.bool_]) -> Array:
+    """The shortest of the steps that leave least, by the rotated columns and residual R, (p + 1, p + 1)."""
+    columns, side = R[:, :-1][:, free], R[:, -1] + R[:, :-1][:, ~free] @ step[~free]
+    most = float(np.linalg.norm(columns, axis=0).max(initial=0.0)) or 1.0
+    # by orthogonal factors: singular values need not converge on free forms of hundreds of columns
+    shortest = lstsq(columns / most, -side / most, cond=RELATIVE_RANK, lapack_driver="gelsy", check_finite=False)[0]
+    return np.asarray(shortest)
+
+
+def _damped(squares: Array, damping: float, step: Array, free: NDArray[np.bool_]) -> Array:
+    """The damped step by the sums of squares and products of the columns, and of them and the residual, (p, p + 1).
+
+    Damping makes the normal equations of columns of one length well conditioned, so that they can be solved as such.
+    """
+    normal, side = squares[:, :-1], squares[free, -1] + squares[free][:, :-1][:, ~free] @ step[~free]
+    size = np.sqrt(np.diag(normal)[free])
+    moving = size > RELATIVE_RANK * size.max(initial=0.0)
+    answer, size = np.zeros(len(size)), size[moving]
+    scaled = normal[np.ix_(free, free)][np.ix_(moving, moving)] / np.outer(size, size)
+    factor = cho_factor(scaled + damping * np.eye(len(size)), lower=True, overwrite_a=True, check_finite=False)
+    answer[moving] = cho_solve(factor, -side[moving] / size, check_finite=False) / size
+    return answer
