@@ -24,6 +24,7 @@ TWO_MASSES = ((0.04, 0.12), (0.02, 0.06))  # of the record: time constants from 
 JUMPS = 4.0  # excess kurtosis of a walk's increments: 500 of a Gaussian process keep within +-1
 UNSEEN = 0.3  # noise floors: a smaller residual of an effect does not show that a wider effect is the cause
 CLEARLY_LESS = 1.5  # ratio of the rms residuals of two effects from which one of them is not the cause
+SAME = 1e-8  # of a column: a smaller part that other columns do not span is rounding
 FOLLOWS = 0.97  # of the variance of a curve over time that a line over a column explains: then the column is the cause
 FOLLOWERS = {"time-bias": ("temperature-bias", "column:std"), "time-scale": ("temperature-scale",)}
 
@@ -68,7 +69,7 @@ def _name_effects(
         needed_causes, share = _necessary({cause: columns[cause][0] for cause in acting_causes}, curve, total)
         return _one_name(result, names, needed_causes, curve, Q), share
 
-    def options_of(cause: str, chosen: Sequence[Array]) -> Sequence[Array]:
+    def options_of(cause: str, chosen: Array) -> Sequence[Array]:
         options = [*columns[cause], *_at_best_shapes(result, forms[cause], curve, chosen, Q)]
         return [*options, *_two_masses(result, forms[cause], curve, chosen, Q)] if cause in WARM_UPS else options
 
@@ -107,26 +108,26 @@ def _select_causes(
     acting: Sequence[str],
     first: Sequence[str],
     curve: Array,
-    options_of: Callable[[str, Sequence[Array]], Sequence[Array]],
+    options_of: Callable[[str, Array], Sequence[Array]],
 ) -> tuple[tuple[str, ...], float]:
     """The causes that explain most of the curve, added one at a time, and their share of its variance.
 
-    The causes `first` come before all others. `options_of` gives the columns that a cause may have, beside those of the
-    causes that were chosen before.
+    The causes `first` come before all others. `options_of` gives the columns that a cause may have, beside the
+    orthonormal columns of the causes that were chosen before.
     """
     total = float(curve @ curve) or 1.0
     chosen: dict[str, Array] = {}
+    chosen_basis = np.zeros((len(curve), 0))
     share = 0.0
     while True:
         at_limit = len(set(chosen) - set(acting)) >= MOST_FORMS
-        chosen_columns = list(chosen.values())
         trials: dict[str, tuple[float, Array]] = {}
         for cause in first or candidates:
             if cause in chosen or (at_limit and cause not in acting):
                 continue
-            options = options_of(cause, chosen_columns)
+            options = options_of(cause, chosen_basis)
             squares, X = min(
-                ((_residual_squares([*chosen_columns, X], curve), X) for X in options), key=lambda option: option[0]
+                ((_residual_squares([X], curve, chosen_basis), X) for X in options), key=lambda option: option[0]
             )
             trials[cause] = 1 - squares / total, X
         best = max(trials, key=lambda c: trials[c][0], default="")
@@ -136,6 +137,7 @@ def _select_causes(
             first = []
             continue
         share, chosen[best] = trials[best]
+        chosen_basis = _orthonormal(list(chosen.values()))
 
 
 def _one_name(
@@ -149,7 +151,7 @@ def _one_name(
     """
     causes = dict.fromkeys(cause_names)
 
-    def residual_rms(comps: Sequence[Component], companions: Sequence[Array]) -> float:
+    def residual_rms(comps: Sequence[Component], companions: Array | None = None) -> float:
         squares = min((_residual_at_best(result, c, curve, Q, companions)[0] for c in comps), default=np.inf)
         return float(np.sqrt(squares / len(curve)))
 
@@ -157,8 +159,9 @@ def _one_name(
         at_place = [c for c in result.components if c.place == outer.place and not c.form]
         inner, wider = ([c for c in at_place if c.cause == cause] for cause in (outer.contains, outer.cause))
         unshaped = [c.reshaped((0.0,) * len(c.shape)) if c.reshaped else c for c in inner[:1]]
-        clear = CLEARLY_LESS * residual_rms(wider, [_columns_of(result, c, Q) for c in unshaped])
-        name = outer.cause if residual_rms(inner, []) > max(UNSEEN, clear) else outer.contains
+        companions = _orthonormal([_columns_of(result, c, Q) for c in unshaped]) if unshaped else None
+        clear = CLEARLY_LESS * residual_rms(wider, companions)
+        name = outer.cause if residual_rms(inner) > max(UNSEEN, clear) else outer.contains
         causes = dict.fromkeys(name if cause in (outer.cause, outer.contains) else cause for cause in causes)
     return tuple(causes)
 
@@ -186,13 +189,16 @@ def _find_followed_column(
 
 
 def _residual_at_best(
-    result: SearchResult, comp: Component, curve: Array, Q: Array, companions: Sequence[Array] = ()
+    result: SearchResult, comp: Component, curve: Array, Q: Array, companions: Array | None = None
 ) -> tuple[float, Component]:
-    """Residual sum of squares of a curve after a component in its best shape, and the component in that shape."""
+    """Residual sum of squares of a curve after a component in its best shape, and the component in that shape.
+
+    The curve is also free along the orthonormal columns of `companions`, (rows, k).
+    """
 
     def squares(shape: tuple[float, ...]) -> float:
         shaped = comp.reshaped(shape) if comp.reshaped is not None else comp
-        return _residual_squares([*companions, _columns_of(result, shaped, Q)], curve)
+        return _residual_squares([_columns_of(result, shaped, Q)], curve, companions)
 
     if comp.reshaped is None:
         return squares(comp.shape), comp
@@ -201,7 +207,7 @@ def _residual_at_best(
 
 
 def _at_best_shapes(
-    result: SearchResult, comps: Sequence[Component], curve: Array, companions: Sequence[Array], Q: Array
+    result: SearchResult, comps: Sequence[Component], curve: Array, companions: Array, Q: Array
 ) -> list[Array]:
     """Columns of the components of one cause that have one value of shape, each at the shape that leaves least."""
     shaped = [c for c in comps if c.reshaped and len(c.shape) == 1 and c.form is None and not c.contains]
@@ -209,7 +215,7 @@ def _at_best_shapes(
 
 
 def _two_masses(
-    result: SearchResult, comps: Sequence[Component], curve: Array, companions: Sequence[Array], Q: Array
+    result: SearchResult, comps: Sequence[Component], curve: Array, companions: Array, Q: Array
 ) -> list[Array]:
     """Columns of two exponential approaches, of any signs, that end within the record: those of two thermal masses."""
     reshaped = next((c.reshaped for c in comps if c.reshaped and c.form is None), None)
@@ -219,7 +225,7 @@ def _two_masses(
     def columns(shape: Sequence[float]) -> Array:
         return np.hstack([_columns_of(result, reshaped((min(abs(part), SETTLED),)), Q) for part in shape])
 
-    best = climb(lambda shape: -_residual_squares([*companions, columns(shape)], curve), *TWO_MASSES)
+    best = climb(lambda shape: -_residual_squares([columns(shape)], curve, companions), *TWO_MASSES)
     return [columns(best)]
 
 
@@ -272,8 +278,19 @@ def _columns(result: SearchResult, comps: Sequence[Component], names: Sequence[s
     return [np.hstack(acting_parts)] if acting_parts else parts
 
 
-def _residual_squares(columns: Sequence[Array], y: Array) -> float:
+def _residual_squares(columns: Sequence[Array], y: Array, companions: Array | None = None) -> float:
+    """Sum of squares of y after its projection on columns, and on the orthonormal `companions`, (rows, k)."""
     X = np.hstack(columns)
-    scale = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
-    residual = y - X @ (np.linalg.lstsq(X / scale, y, rcond=1e-8)[0] / scale)
+    X = X / np.maximum(np.linalg.norm(X, axis=0), 1e-300)
+    if companions is not None:
+        X, y = project_off(companions, X), project_off(companions, y)
+        X[:, np.linalg.norm(X, axis=0) < SAME] = 0.0
+    residual = y - X @ np.linalg.lstsq(X, y, rcond=SAME)[0]
     return float(residual @ residual)
+
+
+def _orthonormal(columns: Sequence[Array]) -> Array:
+    """Orthonormal columns that span the given ones, (rows, k)."""
+    X = np.hstack(columns)
+    U, sizes, _ = np.linalg.svd(X / np.maximum(np.linalg.norm(X, axis=0), 1e-300), full_matrices=False)
+    return np.asarray(U[:, sizes > SAME * sizes[0]])
