@@ -241,7 +241,8 @@ class Effect:
     def columns(self, a: Array, table: Table) -> Mapping[str, Array] | None:
         """By name, the part of the output for one unit of each parameter, shape (n, 3), if `transduction` is linear.
 
-        Derivatives are then exact and fast. None if an effect does not state it.
+        Derivatives are then exact and fast. None if an effect does not state it. For an effect at the output, `a` is
+        the output before it.
         """
         return None
 

@@ -5,6 +5,7 @@ The forms are kept with the model, so that the effect is the same function on ev
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -157,6 +158,15 @@ class FreeForm(Effect):
     def _has_columns(self, table: Table, force: Array) -> bool:
         return self._last is not None and self._last[0] is table and self._last[1] is force
 
+    def _named(self, columns_by_axis: Sequence[Array]) -> dict[str, Array]:
+        """Columns (n, count) of each axis by the name of their parameter, (n, 3)."""
+        by_name = {p.name: np.zeros((len(columns_by_axis[0]), 3)) for p in self.parameters}
+        for k, columns in enumerate(columns_by_axis):
+            names = [_name(form, j) for form in self.forms for j in range(form.count(k))]
+            for name, column in zip(names, columns.T, strict=True):
+                by_name[name][:, k] = column
+        return by_name
+
 
 class _OnResponse(FreeForm):
     """Adds to the output of each axis, (n, 3)."""
@@ -173,12 +183,7 @@ class _OnResponse(FreeForm):
         return contribution
 
     def columns(self, a: Array, table: Table) -> dict[str, Array]:
-        by_name = {p.name: np.zeros(a.shape) for p in self.parameters}
-        for k, columns in enumerate(self._cache_columns(table, a)):
-            names = [_name(form, j) for form in self.forms for j in range(form.count(k))]
-            for name, column in zip(names, columns.T, strict=True):
-                by_name[name][:, k] = column
-        return by_name
+        return self._named(self._cache_columns(table, a))
 
 
 class _AtOutput(FreeForm):
@@ -191,6 +196,10 @@ class _AtOutput(FreeForm):
         for k in range(len(table.axes)):
             output[:, k] += self._summed(table, v, v[:, k], k, self._coefficients(p, k))
         return output
+
+    def columns(self, a: Array, table: Table) -> dict[str, Array]:
+        axes = range(len(table.axes))
+        return self._named([np.hstack([form.columns(table, a, a[:, k], k) for form in self.forms]) for k in axes])
 
 
 class _OnAngle(FreeForm):

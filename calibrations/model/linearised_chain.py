@@ -18,6 +18,7 @@ from calibrations.model.chain import (
     apply_transduction,
     convert_output,
     effect_contributions,
+    output_order,
     sensed,
     stage_contribution,
     stage_of,
@@ -70,20 +71,45 @@ class LinearisedChain:
     @cached_property
     def _slope(self) -> Array:
         """d output / d the sum of all parts, where the output stage has no memory, shape (n, axes)."""
-        total, axes = self._total, len(self.table.axes)
-        if not self._has_output_stage:
+        return self._slope_through(self._total, self.steps)
+
+    def _slope_through(self, v: Array, steps: Sequence[Step]) -> Array:
+        """d output / d the output before `steps`, at the value v (n, 3), where they have no memory, (n, axes)."""
+        axes = len(self.table.axes)
+        if not any("output" in effect.places for effect, _ in steps):
             return np.ones((self.table.n, axes))
-        h = 1e-6 * (float(np.ptp(total)) or 1.0)
-        plus, minus = (convert_output([total + s * h], self.table.n, self.table, self.steps) for s in (1.0, -1.0))
+        h = 1e-6 * (float(np.ptp(v)) or 1.0)
+        plus, minus = (convert_output([v + s * h], self.table.n, self.table, steps) for s in (1.0, -1.0))
         return np.asarray((plus - minus)[:, :axes] / (2 * h))
 
     @cached_property
     def columns(self) -> Mapping[int, Mapping[str, Array]]:
         """d output / d each parameter of effects that are linear in them, by term and name, shape (n, axes) each."""
         axes = len(self.table.axes)
-        by_term = {i: self._columns_of(effect) for i, (effect, _) in enumerate(self.steps)}
-        slopes = {i: self._slope * self._drift_of(effect)[:, :axes] for i, (effect, _) in enumerate(self.steps)}
+        at_output = [i for i, (effect, _) in enumerate(self.steps) if effect.places == {"output"}]
+        before = [i for i in range(len(self.steps)) if i not in at_output]
+        by_term = {i: self._columns_of(self.steps[i][0]) for i in before}
+        slopes = {i: self._slope * self._drift_of(self.steps[i][0])[:, :axes] for i in before}
+        for i in at_output:
+            by_term[i], slopes[i] = self._columns_at_output(i)
         return {i: {k: v[:, :axes] * slopes[i] for k, v in c.items()} for i, c in by_term.items() if c is not None}
+
+    def _columns_at_output(self, term: int) -> tuple[Mapping[str, Array] | None, Array]:
+        """d contribution / d each parameter of an effect at the output, (n, 3), and d output / d contribution.
+
+        The parameters are None if the effect is not linear in them, or where the output stage has a memory.
+        """
+        axes, v = len(self.table.axes), self._total
+        if self._needs_output_stage:
+            return None, np.ones((self.table.n, axes))
+        ordered = output_order(self.steps)
+        place = next(i for i, step in enumerate(ordered) if step is self.steps[term])
+        for effect, p in ordered[:place]:
+            v = effect.output(v, self.table, p)
+        effect, p = ordered[place]
+        columns = effect.columns(v, self.table)
+        later = ordered[place + 1 :] if columns is not None else []
+        return columns, self._slope_through(effect.output(v, self.table, p), later)
 
     @cached_property
     def _scales(self) -> bool:
