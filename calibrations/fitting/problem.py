@@ -104,7 +104,8 @@ class Problem:
         """d residual / d theta by central differences, shape (channels, n, p); only the entries `of` if given.
 
         The derivative of a staircase, such as that of quantisation, is its mean slope of 1. With `stairs` it is the
-        exact one, which is useful only near the solution: elsewhere the model errors move the edges.
+        exact one, which is useful only near the solution: elsewhere the model errors move the edges. Free forms have
+        the mean slope in both cases.
         """
         low, high = self.layout.bounds
         steps = 1e-3 * self.layout.typical
