@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 SIGNAL_SOURCES = {
-    "SIGINT": "stopped by a person (SIGINT)",
-    "SIGTERM": "stopped by another program (SIGTERM)",
-    "SIGHUP": "stopped because its terminal was closed (SIGHUP)",
+    "SIGINT": "stopped by a person",
+    "SIGTERM": "stopped by another program",
+    "SIGHUP": "stopped because its terminal was closed",
 }
 ON_A_PAGE = "stopped on a page of the workbench"  # also by SIGINT or SIGTERM, with a mark beside the status file
 COMPILED_PACKAGE = "drivers.world"  # its compiled code calls Python generators; an exception there would break it

@@ -265,7 +265,7 @@ def test_a_signal_of_another_program_is_not_taken_for_a_stop_on_a_page() -> None
         os.kill(running.pid, signal.SIGTERM)
 
     status = carried_out("soak", {"duration_s": "43200"}, person)
-    assert status.error == f"stopped by another program (SIGTERM); `rig resume {status.run}` continues the run"
+    assert status.error == f"stopped by another program; `rig resume {status.run}` continues the run"
     assert not file(status.key, "stop").exists()
 
 

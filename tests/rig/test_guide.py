@@ -327,7 +327,7 @@ def outcome() -> Iterator[Outcome]:
 
     with Record() as record:
         run = record.begin("sweep", {}, bench={}, identities={}, configuration="", constants={}, source="")
-        yield Outcome(record.run(run), Stopped("stopped by a person (SIGINT)"), ("alpha may still move: silence",))
+        yield Outcome(record.run(run), Stopped("stopped by a person"), ("alpha may still move: silence",))
 
 
 def test_the_menu_says_what_each_answer_means(said: Callable[..., None], outcome: Outcome, run: str) -> None:
@@ -340,7 +340,7 @@ def test_the_menu_says_what_each_answer_means(said: Callable[..., None], outcome
         assert shown_to.interrupted(outcome) == "end"  # the terminal is closed
     text = told.getvalue()
     for piece in (
-        "stopped by a person (SIGINT)",
+        "stopped by a person",
         "alpha may still move: silence",
         "alpha 90, beta 10 deg",
         "answer with one of resume",

@@ -63,9 +63,9 @@ def test_the_unit_is_named_in_place_of_its_option(golden) -> None:
 
 def test_a_notification_has_no_commands() -> None:
     running = Status("k", 1, "soak", "a rig", phase="running", run="r1")
-    error = "stopped by a person (SIGINT); `rig resume r1` continues the run"
+    error = "stopped by a person; `rig resume r1` continues the run"
     ended = replace(running, phase="ended", state="stopped", error=error)
-    told = "r1: stopped by a person (SIGINT); the page Run continues the run"
+    told = "r1: stopped by a person; the page Run continues the run"
     assert news(running, ended) == ("soak: stopped", told)
     assert news(running, replace(ended, phase="paused")) == ("soak is paused", told.removeprefix("r1: "))
     assert news(running, replace(ended, state="complete", error="")) == ("soak: complete", "r1")

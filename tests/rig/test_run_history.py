@@ -34,7 +34,7 @@ def test_a_stopped_and_resumed_run_says_so_in_its_events_table_and_export(
         resume(record, run.run, Onlooker())
         events = [(event.what, event.text) for event in history(record, run.run)]
         constants = table_of(record, run.run).constants
-    stop = "by another program (SIGTERM); all instruments are at rest"
+    stop = "by another program; all instruments are at rest"
     assert [event for event in events if not event[0].startswith("answer")] == [
         ("begun", "sweep at pose 0, in a terminal"),
         ("stopped", stop),
