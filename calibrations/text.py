@@ -191,6 +191,11 @@ def size(count: int) -> str:
 # Intervals and limits
 
 
+def with_times(text: str) -> str:
+    """The text with times of ISO 8601 in UTC as people read them: `2026-11-29 21:07:36 UTC`."""
+    return re.sub(r"(\d{4}-\d\d-\d\d)T(\d\d:\d\d:\d\d)(?:\.\d+)?(?:Z|\+00:00)", r"\1 \2 UTC", text)
+
+
 def count_words(number: int, singular: str, plural: str) -> str:
     """`1 batch`, `2 batches`."""
     return f"{number} {singular if number == 1 else plural}"
@@ -198,8 +203,12 @@ def count_words(number: int, singular: str, plural: str) -> str:
 
 def interval(low: float, high: float) -> str:
     """An interval, to a hundredth of its length: `22.32 to 23.13`, `30 to 150`."""
-    decimals = max(1, 1 - exponent(high - low)) if high > low else 6
-    return f"{round(low, decimals):.10g} to {round(high, decimals):.10g}"
+    return f"{to_hundredth(low, high - low)} to {to_hundredth(high, high - low)}"
+
+
+def to_hundredth(value: float, length: float) -> str:
+    """A value to a hundredth of `length`: `43.3` of 60; to six decimals where it is 0."""
+    return f"{round(value, max(1, 1 - exponent(length)) if length > 0 else 6):.10g}"
 
 
 def bound(value: float, limit: float | Sequence[float]) -> str:
@@ -280,6 +289,14 @@ def times_ten_to(power: int) -> str:
 def minus(text: str) -> str:
     """The text with true minus signs."""
     return text.replace("-", "−")
+
+
+def typeset(text: str) -> str:
+    """A sentence of a terminal, which is ASCII, with the signs of a page or a report: −, ±, ×, µ, °C."""
+    signs = re.sub(r"(?<![\w.)\]-])-(?=\d|[xyz]\b)", "−", text.replace("+-", "±"))
+    signs = re.sub(r"(?<=[\d)] )u(?=[Vg]\b)", "µ", signs)
+    signs = re.sub(r"(?<=\d) (deg)?C\b", " °C", signs)
+    return re.sub(r"(?<=\d) x (?=the |that |its )", " × ", signs)
 
 
 def sentence(text: str) -> str:

@@ -76,6 +76,23 @@ def split_unit(name: str) -> tuple[str, str]:
     return name.removesuffix(f"_{end}"), UNITS.get(end, "")
 
 
+COUNTS = {
+    "reference_every": "poses between two references",
+    "times": "times (tumbles of each sort)",
+    "cycles": "cycles (of temperature)",
+    "mounts": "mounts (edges upright)",
+}
+
+
+def setting_label(name: str) -> str:
+    """`step_deg` as `step (deg)`, `size_um` as `size (µm)`; a count with what it counts."""
+    if name in COUNTS:
+        return COUNTS[name]
+    head, unit_name = split_unit(name)
+    spelt = {"um": "µm", "m/s^2": "m/s²"}.get(unit_name, unit_name)
+    return f"{head.replace('_', ' ')} ({spelt})" if spelt else head.replace("_", " ")
+
+
 def setting_text(value: Value) -> str:
     """The text of a value, as a person types it."""
     if isinstance(value, (list, tuple)):

@@ -35,6 +35,7 @@ from calibrations.presentation.charts.discovery import brief
 from calibrations.progress import report
 from calibrations.table import Table
 from calibrations.text import as_written
+from procedures.settings import setting_label, setting_text
 from rig.bench import Bench
 from rig.bench.certificates import EXPIRED, certificates
 from rig.files import program
@@ -208,15 +209,11 @@ def _facts(run: Run | None, table: Table) -> dict[str, str]:
     if run is None:
         return facts
     settings = {
-        name.replace("_", " "): _setting_text(value) for name, value in run.settings.items() if _setting_text(value)
+        setting_label(name): setting_text(value)
+        for name, value in run.settings.items()
+        if value not in (None, "") and not isinstance(value, Mapping)
     }
     return {"run": run.run, "state": run.state, **facts, **settings}
-
-
-def _setting_text(value: object) -> str:
-    if isinstance(value, list | tuple):
-        return ", ".join(str(part) for part in value)
-    return "" if value is None or isinstance(value, Mapping) else str(value)
 
 
 def _reference(table: Table) -> str:

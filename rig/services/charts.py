@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date, datetime, timedelta
@@ -103,6 +104,11 @@ def kind_of(dwell: Dwell) -> str:
     """Dwells of numbered paths belong together by name: `hold` of `hold 17`; those of a sweep are of one kind, ""."""
     head, _, number = dwell.pose.path.rpartition(" ")
     return head if number.isdigit() else ""
+
+
+def kind_label(kind: str) -> str:
+    """`up 35 °C` for the paths of a temperature cycle, `up 35 cycle 1`; other kinds by their own name."""
+    return re.sub(r"^(up|down) (-?[\d.]+) cycle$", r"\1 \2 °C", kind) or "poses"
 
 
 # Charts of the record: a run over time, a sensor's life, and two runs compared.

@@ -10,6 +10,8 @@ from calibrations.analyses.motion import MotionResult
 from calibrations.discovery.results import Discovery
 from calibrations.discovery.verdict import Verdict
 from calibrations.errors import UnusableData
+from calibrations.text import with_times
+from procedures.settings import setting_label, setting_text
 from rig.files import program
 from rig.record import Record
 from rig.record.measured import INTERRUPTIONS, MeasuredRun
@@ -72,10 +74,10 @@ def _facts(measured: MeasuredRun, date: str, program: str) -> Mapping[str, str]:
     return {
         "sensor": " ".join(sensor) or run.source,
         "run": f"{measured.name}, {run.state}",
-        "begun": run.created,
-        "ended": run.ended or "–",
-        INTERRUPTIONS: str(measured.constants.get(INTERRUPTIONS, "none")),
-        "settings": ", ".join(f"{name} {value}" for name, value in run.settings.items()),
+        "begun": with_times(run.created),
+        "ended": with_times(run.ended or "–"),
+        INTERRUPTIONS: with_times(str(measured.constants.get(INTERRUPTIONS, "none"))),
+        "settings": "; ".join(f"{setting_label(name)}: {setting_text(value)}" for name, value in run.settings.items()),
         **run.instruments,
         "program": program,
         "date": date,

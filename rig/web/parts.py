@@ -16,10 +16,10 @@ from nicegui import ui
 from nicegui.element import Element
 
 from calibrations.errors import CalibrationError
-from calibrations.text import unit
+from calibrations.text import typeset
 from drivers.errors import DriverError
 from procedures.errors import ProcedureError
-from procedures.settings import split_unit
+from procedures.settings import setting_label
 from rig.errors import RigError
 from rig.files import home
 from rig.services.page_words import PageStep, page_step
@@ -231,32 +231,11 @@ def raw_message(error: Exception) -> str:
 
 
 def for_page(text: str) -> str:
-    """A sentence of the command line with typographic signs (−, ±, ×, µ, °C) and the own names of uploaded files."""
-    text = text.replace(f"{home() / FILES}{os.sep}", "")
-    signs = re.sub(r"(?<![\w.)\]-])-(?=\d)", "−", text.replace("+-", "±"))
-    signs = re.sub(r"(?<=\d )u(?=[Vg]\b)", "µ", signs)
-    signs = re.sub(r"(?<=\d) (deg)?C\b", " °C", signs)
-    return re.sub(r"(?<=\d) x (?=the |that |its )", " × ", signs)
+    """A sentence of the command line with the signs of a page and the own names of uploaded files."""
+    return typeset(text.replace(f"{home() / FILES}{os.sep}", ""))
 
 
-# Settings of a procedure as text: `step_deg = 10.0` is shown as `step (deg)`, `10`.
-
-
-COUNTS = {
-    "reference_every": "poses between two references",
-    "times": "times (tumbles of each sort)",
-    "cycles": "cycles (of temperature)",
-    "mounts": "mounts (edges upright)",
-}
-
-
-def setting_label(name: str) -> str:
-    """`step_deg` as `step (deg)`; a count with what it counts."""
-    if name in COUNTS:
-        return COUNTS[name]
-    head, stated_unit = split_unit(name)
-    spelt = {"um": "µm"}.get(stated_unit, unit(stated_unit))
-    return f"{head.replace('_', ' ')} ({spelt})" if spelt else head.replace("_", " ")
+# Settings of a procedure in messages: their labels, as the form shows them.
 
 
 def with_labels(text: str, names: Iterable[str]) -> str:

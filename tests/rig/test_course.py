@@ -10,7 +10,7 @@ import pytest
 
 from calibrations.presentation.chart import Line
 from procedures.session import Dwell, Pose
-from rig.services.charts import MOST, Course, RunTime, course_chart, kind_of
+from rig.services.charts import MOST, Course, RunTime, course_chart, kind_label, kind_of
 
 
 def dwell(number: int, path: str = "hold 1") -> Dwell:
@@ -42,6 +42,11 @@ def test_what_was_measured_has_names() -> None:
 @pytest.mark.parametrize(("path", "kind"), [("hold 17", "hold"), ("A+ to B-", ""), ("", ""), ("17", "")])
 def test_dwells_of_numbered_paths_belong_together(path: str, kind: str) -> None:
     assert kind_of(dwell(1, path)) == kind
+
+
+@pytest.mark.parametrize(("kind", "label"), [("up 35 cycle", "up 35 °C"), ("hold", "hold"), ("", "poses")])
+def test_a_kind_of_poses_has_a_label(kind: str, label: str) -> None:
+    assert kind_label(kind) == label
 
 
 def test_the_scatter_of_a_dwell_has_a_prefix_and_its_mean_has_none() -> None:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlencode
 
 from calibrations.presentation.report.report import next_takes, next_words
-from procedures.settings import setting_text
+from procedures.settings import setting_label, setting_text
 from rig.services.search import Cancelled
 from rig.web.calculations import Visit
-from rig.web.parts import afresh, box, buttons, div, message, setting_label, waiting, words
+from rig.web.parts import afresh, box, buttons, div, message, waiting, words
 
 if TYPE_CHECKING:
     from calibrations.design.experiment import Experiment

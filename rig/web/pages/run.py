@@ -15,7 +15,7 @@ from nicegui import ui
 from calibrations.text import duration
 from procedures.catalogue import Procedure, find, paths, summary
 from procedures.errors import SettingError
-from procedures.settings import choices, meaning, parse, setting_text
+from procedures.settings import choices, meaning, parse, setting_label, setting_text
 from rig.bench import Bench, read_bench
 from rig.bench.certificates import find_expired
 from rig.bench.file import DEMO
@@ -31,7 +31,7 @@ from rig.web.frame import Key, frame
 from rig.web.pages.run_begin import BeginDialog, before_start, plan_facts
 from rig.web.pages.run_live import Live
 from rig.web.pages.run_optimal import OptimalDialog
-from rig.web.parts import box, button, div, facts, message, setting_label, show_error, shown, table, with_labels, words
+from rig.web.parts import box, button, div, facts, message, show_error, shown, table, with_labels, words
 
 MOST_STRETCHES = 12
 DEFAULT_PROCEDURE = "sweep"

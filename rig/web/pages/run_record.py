@@ -12,13 +12,13 @@ from nicegui import ui
 
 from calibrations.presentation.interactive import figure
 from calibrations.text import join_words
-from procedures.settings import setting_text
+from procedures.settings import setting_label, setting_text
 from rig.bench.result_names import label
 from rig.errors import RecordError
 from rig.record import Event, Record, Run
 from rig.record.history import history
 from rig.record.tables import units_of
-from rig.services.charts import Course, RunTime, course_chart, kind_of
+from rig.services.charts import Course, RunTime, course_chart, kind_label, kind_of
 from rig.services.exclusion import exclude, find_numbered_run
 from rig.services.export import export
 from rig.services.history import calibration_counts, type_of
@@ -41,7 +41,6 @@ from rig.web.parts import (
     for_page,
     message,
     notify_error,
-    setting_label,
     show_error,
     step_row,
     table,
@@ -165,7 +164,7 @@ class OverTime:
 
     def _offer(self) -> None:
         """Offer the kinds of poses and the quantities; the most frequent kind, until a person selects one."""
-        kinds = {kind: kind or "poses" for kind in self.courses}
+        kinds = {kind: kind_label(kind) for kind in self.courses}
         most = max(self.courses, key=lambda kind: len(self.courses[kind].parts))
         value = self.kind.value if self.chosen and self.kind.value in kinds else most
         if (list(kinds), value) != (list(self.kind.options), self.kind.value):
