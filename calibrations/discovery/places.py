@@ -19,7 +19,7 @@ from calibrations.fitting.fit import Fit, axis_of, milli_unit, scales
 from calibrations.means.noise import most_scatter, rms
 from calibrations.model.chain import backward
 from calibrations.table import Array, Table, in_time, time_origin
-from calibrations.text import interval, milli_amount
+from calibrations.text import interval, milli_amount, to_hundredth
 
 MOST_PLACES = 8
 PARTS = 8  # of a column without a natural grid
@@ -130,12 +130,17 @@ def _stretch_words(table: Table, coordinate: str, low: float, high: float) -> st
         return f"side {SIDES[round(low)]}"
     if coordinate == "direction":
         return {1: "turning clockwise", -1: "turning anticlockwise", 0: "direction unknown"}[round(low)]
-    unit, origin_words = WORDS[coordinate][1], ""
+    column, unit = WORDS[coordinate]
+    size, zero, origin_words, reach = 1.0, 0.0, "", float(np.ptp(table.column(column)))
     if coordinate == "time":
-        size, unit = in_time(float(np.ptp(table.time_s)))
-        zero_s, origin_words = time_origin(table)
-        low, high = (low - zero_s) / size, (high - zero_s) / size
-    return f"{coordinate} {f'{low:g}' if low == high else interval(low, high)} {unit}{origin_words}"
+        size, unit = in_time(reach)
+        zero, origin_words = time_origin(table)
+    low, high = (low - zero) / size, (high - zero) / size
+    if low != high:
+        text = interval(low, high)
+    else:  # one of few values: angles and rates as they were set, times and temperatures as they were measured
+        text = to_hundredth(low, reach / size) if coordinate in ("time", "temperature") else f"{low:g}"
+    return f"{coordinate} {text} {unit}{origin_words}"
 
 
 def _by_noise(fit: Fit) -> Array:

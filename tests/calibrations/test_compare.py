@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from calibrations.criteria import MATERIAL
+from calibrations.discovery.places import _stretch_words
 from calibrations.discovery.verdict import Judgement, Verdict
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import fit, scales
@@ -49,6 +50,15 @@ def test_times_of_a_run_begin_at_its_first_pose() -> None:
     assert place.low > 40_000.0
     first, last = (at[(at >= place.low) & (at <= place.high)][[0, -1]] - 40_000.0) / 60.0
     assert place.text.startswith(f"time {first:.1f} to {last:.1f} min since the first pose: x is off by")
+
+
+def test_single_times_and_temperatures_have_few_digits() -> None:
+    few = table().rows(np.arange(4))
+    at = np.array([0.0, 43.282_711, 60.123_4, 91.5])
+    timed = replace(few, columns={**few.columns, "t_s": at, "temperature_c": 36.283_45 + at / 1e3})
+    words = [_stretch_words(timed, *place) for place in (("time", at[1], at[1]), ("temperature", 36.326_73, 36.326_73))]
+    assert words == ["time 43.3 s since the first pose", "temperature 36.327 degC"]
+    assert _stretch_words(timed, "alpha", 12.345, 12.345) == "alpha 12.345 deg"  # as it was set
 
 
 def test_errors_in_mg_use_the_scale_factor_of_their_axis() -> None:
