@@ -31,6 +31,7 @@ from calibrations.presentation.charts.discovery import (
     effect_chart,
     levels,
     notable_steps,
+    steps_album,
     waterfall,
 )
 from calibrations.presentation.charts.noise import ratio
@@ -280,6 +281,17 @@ def test_an_effect_is_drawn_over_what_it_follows() -> None:
     curve = left.series[-1]
     assert isinstance(curve, Line)
     assert np.polyfit(curve.x, curve.y, 1)[0] == pytest.approx(0.2, rel=0.02)  # mV/K
+
+
+def test_outputs_that_an_effect_does_not_change_are_not_drawn() -> None:
+    (step,) = warm().steps
+    assert len(effect_chart(step).panels) == 2
+    unchanged = step.after.residual.copy()
+    unchanged[1] = step.before.residual[1] + 1e-9 * step.after.noise.floor[1]  # rounding
+    of_x = replace(step, after=replace(step.after, residual=unchanged))
+    assert len(effect_chart(of_x).panels) == 1
+    caption = next(picture.caption for picture in steps_album(warm()) if picture.name.startswith("effect-"))
+    assert "left out" not in caption
 
 
 def test_a_quadratic_is_drawn_over_the_axis_itself() -> None:

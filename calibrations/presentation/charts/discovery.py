@@ -178,4 +178,6 @@ def _curve(step: Step[Fit], discovery: Discovery[Fit]) -> Picture:
         f"{remark}Left: the residual before, and the part explained by {step.name} (full line clockwise, broken "
         "line anticlockwise). Right: the residual after, on the same scale."
     )
+    if len(drawn_channels(step.before, change_of(step))) < len(step.before.channels):
+        caption += " Outputs that it does not change are left out."
     return Picture(f"effect-{step.name}", f"Contribution of {step.name}", caption, effect_chart(step))

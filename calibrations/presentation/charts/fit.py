@@ -61,6 +61,7 @@ VISIT_PX = 6.0  # a marker of a pose that is visited again and again
 TOWARDS = "towards x; left: z upwards, right: z downwards (equal-area map)"
 HALF_SPHERES = 2.3  # between the centres of both maps
 SMALL_ROW, ROW = 2.0, 3.0  # inches: a motion has many channels
+ROUNDING = 1e-6  # times the noise floor: a smaller change of an output is not drawn
 MOST_ROWS = 4  # channels of a motion that are drawn
 ACROSS_PX, DOWN_PX, LEAST_PX, MOST_PX = 900.0, 330.0, 3.0, 10.0  # of a map of poses: its width, height; its markers
 
@@ -121,11 +122,14 @@ def failure_chart(fit: Fit) -> Chart:
 
 
 def drawn_channels(fit: Fit, values: Array) -> list[int]:
-    """All channels; of a motion those with the largest rms of `values`, shape (channels, n), over the noise floor."""
-    channels = range(len(fit.channels))
-    if not fit.table.type.moving:
-        return list(channels)
+    """Channels with `values`, (channels, n), that are more than rounding; all if none has.
+
+    Of a motion, those with the largest rms of `values` over the noise floor.
+    """
     size = rms(values) / fit.noise.floor
+    channels = [c for c in range(len(fit.channels)) if size[c] > ROUNDING] or list(range(len(fit.channels)))
+    if not fit.table.type.moving:
+        return channels
     return sorted(sorted(channels, key=lambda c: -float(size[c]))[:MOST_ROWS])
 
 
