@@ -88,11 +88,12 @@ class Constant:
     """A reference value, such as the mean temperature: computed from the first table, then kept with the model.
 
     `assumed` is the value in model files that give other constants of the effect and not this one, as they were written
-    before it existed.
+    before it existed. `doc` says in a report what it is, where its name with the unit does not.
     """
 
     of: Callable[[Table], float]
     assumed: float | None = None
+    doc: str = ""
 
 
 class Values(dict[str, Array]):
@@ -133,6 +134,7 @@ class Effect:
     parameters: tuple[Parameter, ...] = ()
     constants: Mapping[str, Callable[[Table], float]] = {}
     assumed_constants: Mapping[str, float] = {}  # their values in model files that do not give them
+    constant_docs: Mapping[str, str] = {}  # what they are, in words
     places: frozenset[str] = frozenset()  # those of HOOKS where it acts
     expression: str = ""  # where one line of arithmetic defines it; kept in model files
 
@@ -169,6 +171,7 @@ class Effect:
         cls.constants = {**cls.constants, **{m: v.of for m, v in constants.items()}}
         assumed = {m: v.assumed for m, v in constants.items() if v.assumed is not None}
         cls.assumed_constants = {**cls.assumed_constants, **assumed}
+        cls.constant_docs = {**cls.constant_docs, **{m: v.doc for m, v in constants.items() if v.doc}}
         cls.places = frozenset(hook for hook in HOOKS if getattr(cls, hook) is not getattr(Effect, hook))
         if "Symptom" in (cls.__doc__ or ""):
             for part, text in _sections(cls.__doc__ or "").items():

@@ -46,6 +46,9 @@ def has_times(table: Table) -> bool:
     return table.n > 1 and "t_s" in table and bool(np.ptp(table.time_s) > 0)
 
 
+LEVEL_DOC = "follows the readings without their scatter (1: yes, 0: no)"  # what `follows_level` says
+
+
 def follows_level(table: Table, names: Sequence[str], power: int = 1, scales: bool = False) -> float:
     """1.0 where the outputs of poses follow the level of a column, one or one an axis, more closely than its readings.
 

@@ -17,6 +17,7 @@ from calibrations.table import Array, Table
 
 SAME_DIRECTION = 1e-6  # of the largest singular value: products below that the poses do not tell apart
 STATED_APPROACH = -1.0  # an approach as the table states it
+APPROACH_DOC = "turn of beta before a pose (deg; -1: as the table states it)"
 _LATEST: list[tuple[Table, Array, Array]] = []  # at most one path: its table, the force at the poses, its points
 
 

@@ -12,7 +12,18 @@ from calibrations.noise.doubts import Disturbance
 from calibrations.noise.record import Sensed
 from calibrations.noise.samples import COARSE
 from calibrations.noise.telegraph import SEVERAL_LEVELS, TWO_LEVELS
-from calibrations.text import PREFIX_UNITS, Cells, columns, concise, duration, prefix, rounded, sentence
+from calibrations.text import (
+    PREFIX_UNITS,
+    Cells,
+    columns,
+    concise,
+    duration,
+    prefix,
+    rounded,
+    sentence,
+    typeset,
+    unit,
+)
 
 MEANS = {
     "white-noise": "velocity or angle random walk",
@@ -22,6 +33,7 @@ MEANS = {
     "sinusoidal-noise": "amplitude",
     "gauss-markov-noise": "standard deviation",
 }
+SYMBOLS = {"white-noise": "N", "flicker-noise": "B", "rate-random-walk": "K", "quantisation-noise": "Q"}
 NOISE = (COARSE, TWO_LEVELS, SEVERAL_LEVELS)  # noise that the coefficients alone do not describe
 
 
@@ -52,6 +64,17 @@ def coefficient_table(noise: ChannelNoise, sensed: Sensed | None) -> Cells:
         meaning = MEANS.get(name, "") + _detail(coefficient)
         rows.append((name, _coefficient_text(coefficient, 1.0, noise.unit, noise.unit), *second, meaning))
     return ("process", "coefficient", *(() if sensed is None else (f"in {sensed.unit}",)), "meaning"), rows
+
+
+def typeset_coefficients(noise: ChannelNoise, sensed: Sensed | None) -> tuple[Cells, str]:
+    """`coefficient_table` with a first column of usual symbols, and `density`; both with the signs of a page."""
+    head, rows = coefficient_table(noise, sensed)
+    cells = [(SYMBOLS.get(row[0], ""), *map(_with_signs, row)) for row in rows]
+    return (("", *map(_with_signs, head)), cells), _with_signs(density(noise, sensed))
+
+
+def _with_signs(text: str) -> str:
+    return unit(typeset(text))
 
 
 def _disturbances(analysis: NoiseAnalysis) -> Iterable[str]:

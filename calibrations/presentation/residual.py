@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,20 +19,29 @@ from calibrations.text import milli_amount, rounded
 
 RESOLUTION_C = 0.01  # a smaller range of temperatures is that of a constant one
 MANY_VISITS = 10  # of one pose: the change over time is the question, and not the angle
-LABELS = {"temperature_c": "temperature (°C)", "supply_v": "supply voltage (V)"}
 POSE_COLUMNS = ("direction", "alpha_deg", "beta_deg")
 NAMES = {
     "alpha_deg": "α (deg)",
     "beta_deg": "β (deg)",
     "temperature_c": "temperature (°C)",
-    "supply_v": "supply (V)",
+    "supply_v": "supply voltage (V)",
     "direction": "direction of turning",
     "mount_deg": "turn on the table (deg)",
     "flip": "face down",
     "n": "samples averaged",
-    "rate_deg_s": "rate (deg/s)",
+    **{f"axis_{axis}": f"axis of rotation along {axis}" for axis in AXES},
+    **{f"a{axis}": f"specific force along {axis} (g)" for axis in AXES},
 }
-UNITS = {"deg": "deg", "v": "V", "s": "s", "c": "°C", "m": "m"}
+UNITS = {  # ends of names
+    "deg_s": "deg/s",
+    "m_s2": "m/s²",
+    "deg": "deg",
+    "hz": "Hz",
+    "v": "V",
+    "s": "s",
+    "c": "°C",
+    "m": "m",
+}
 
 
 @dataclass(frozen=True)
@@ -95,7 +104,7 @@ def select_telling_columns(fit: Fit, effect: Effect) -> list[Column]:
 def _driver(table: Table, name: str, n: int) -> Column:
     if name == "t_s":
         return _time(table, n)
-    return _column(name, LABELS.get(name, f"{name} (as given)"), table.column(name), n)
+    return _column(name, column_label(name), table.column(name), n)
 
 
 def _logged_columns(table: Table, n: int) -> list[Column]:
@@ -130,7 +139,7 @@ def choices(fit: Fit) -> dict[str, Column]:
     driver_columns |= {"t_s", "temperature_c"} & set(table.columns)
     for name, values in table.columns.items():
         if name not in driver_columns:
-            by_name[name] = Column(name, (column_label(name),) * n, np.tile(values, (n, 1)))
+            by_name[name] = Column(name, (column_label(name, table.output_names),) * n, np.tile(values, (n, 1)))
     return by_name
 
 
@@ -157,12 +166,16 @@ def repeats(table: Table) -> bool:
     return len(angles) >= MANY_VISITS * len(np.unique(angles, axis=0))
 
 
-def column_label(column: str) -> str:
-    """The label of a table's column, with its unit."""
-    if column in NAMES:
+def column_label(column: str, outputs: Collection[str] = ()) -> str:
+    """The label of a column or a constant, with its unit: `rate_deg_s` as `rate (deg/s)`.
+
+    Of the `outputs` of a sensor, `ax` is what it said, and no specific force that is known.
+    """
+    if column in NAMES and column not in outputs:
         return NAMES[column]
-    head, _, last = column.rpartition("_")
-    return f"{head.replace('_', ' ')} ({UNITS[last]})" if head and last in UNITS else column.replace("_", " ")
+    end = next((end for end in UNITS if column.removesuffix(f"_{end}") not in ("", column)), "")
+    label = column.removesuffix(f"_{end}").replace("_", " ")
+    return f"{label} ({UNITS[end]})" if end else label
 
 
 MOST = 4000  # rows that are drawn; more would make a page slow and a picture no clearer

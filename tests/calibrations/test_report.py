@@ -21,7 +21,9 @@ from calibrations.loop import compare, discover
 from calibrations.model import Estimate, Model, Term
 from calibrations.model.file import read_model
 from calibrations.presentation.chart import Chart, Panel, Picture
+from calibrations.presentation.report.parameters import constant_facts, model_facts
 from calibrations.presentation.report.report import next_takes, next_words, report, summary
+from calibrations.presentation.residual import column_label
 from calibrations.table import Table
 from calibrations.text import (
     concise_in_prefix,
@@ -31,11 +33,12 @@ from calibrations.text import (
     interval,
     join_words,
     milli_amount,
-    minus,
     probability,
     rounded,
+    typeset,
     unit,
     value_text,
+    with_times,
 )
 from tests.calibrations.test_pictures import EFFECTS, by_hand, hand_table, warm, warm_table
 
@@ -157,8 +160,7 @@ def test_it_holds_every_place_where_the_model_fails() -> None:
     text = Page(page()).text
     assert beside().fails
     for place in beside().fails:
-        words = minus(place.text).replace("x the noise", "× the noise")
-        assert words[1:] in text
+        assert typeset(place.text)[1:] in text
 
 
 def test_a_report_lists_every_candidate() -> None:
@@ -292,6 +294,62 @@ def test_the_page_names_the_pattern_of_an_unexplained_residual() -> None:
     text = Page(report(found, beside(), "d", "p")).text
     assert "Pattern of the residual: step at t = 3120 s." in text
     assert "This effect was tried and not kept" in text
+
+
+def test_a_pattern_has_the_signs_of_a_page() -> None:
+    found = Discovery.of(replace(warm().findings.without_steps(), left="scatter at -3 degC, 3.4 x the noise floor"))
+    text = Page(report(found, beside(), "d", "p", blank())).text
+    assert text.count("scatter at −3 °C, 3.4 × the noise floor") == 4  # title, headline, summary, next experiment
+    assert "3.4 x" not in text
+
+
+def test_signs_of_a_page_stand_in_place_of_those_of_a_terminal() -> None:
+    texts = ("side -x", "-9.45 uV (-9.45 ug)", "785.5(73) uV", "2 +- 1", "36 degC", "rms 2 x the noise floor")
+    assert [typeset(text) for text in texts] == [
+        "side −x", "−9.45 µV (−9.45 µg)", "785.5(73) µV", "2 ± 1", "36 °C", "rms 2 × the noise floor",
+    ]  # fmt: skip
+    for kept in ("bias-x", "2024-05-06", "uV", "alpha-2", "x the noise"):
+        assert typeset(kept) == kept
+
+
+def test_the_provenance_has_labels_and_readable_times() -> None:
+    constants = {
+        "serial": 1234567.0,
+        "noise_inflation_x": 0.9828633900152628,
+        "sample_rate_hz": 1000.0,
+        "interruptions": "2026-11-29T21:07:36Z stopped by a person",
+    }
+    assert constant_facts(constants) == {
+        "constant: serial": "1234567",
+        "constant: noise inflation x": "0.982863",
+        "constant: sample rate (Hz)": "1000",
+        "constant: interruptions": "2026-11-29 21:07:36 UTC stopped by a person",
+    }
+    model = replace(read_model("linear"), provenance={"data_sha256": "ab", "created": "2026-11-29T21:07:36+00:00"})
+    assert model_facts(model) == {
+        "model given": "linear",
+        "model given: data sha256": "ab",
+        "model given: created": "2026-11-29 21:07:36 UTC",
+    }
+    assert with_times("2026-11-29T21:07:36.123456+00:00") == "2026-11-29 21:07:36 UTC"
+    assert with_times("2026-11-29, 30 days") == "2026-11-29, 30 days"
+
+
+def test_reference_values_of_a_gyroscope_are_in_words() -> None:
+    docs = catalogue()["gyro-scale-factor"].constant_docs
+    assert docs["turned_x"].startswith("turns about x")
+    assert set(docs) == {"turned_x", "turned_y", "turned_z", "assumed"}
+    text = Page(page()).text
+    assert "reference (°C)" in text
+    assert "reference_c" not in text
+
+
+def test_columns_have_labels_with_their_units() -> None:
+    assert column_label("az") == "specific force along z (g)"
+    assert column_label("az", ("ax", "ay", "az")) == "az"  # an output of the sensor
+    assert column_label("pressure_m_s2") == "pressure (m/s²)"
+    assert column_label("vx_v") == "vx (V)"
+    assert column_label("s") == "s"
 
 
 def test_names_are_joined_by_commas_and_and() -> None:

@@ -118,6 +118,12 @@ def test_the_report_is_one_page_with_both_pictures(rig: Rig, folder: Path) -> No
     assert 'The model "still" misses flicker-noise.' in html.unescape(page)
     assert "Allan deviation and model" in page
     assert "src=" not in page
+    cells = [re.sub(r"<[^>]*>|\s+", " ", row).split() for row in re.findall(r"<tr>(.*?)</tr>", page, re.DOTALL)]
+    table = {row[0]: " ".join(row[1:]) for row in cells if row and row[0] in ("N", "B", "K", "Q")}
+    assert set(table) == {"N", "B", "K", "Q"}
+    assert table["K"].startswith("rate-random-walk not identified, below")
+    assert re.match(r"white-noise [\d.]+\(\d+\) µV/√Hz", table["N"])
+    assert "Noise density as in data sheets" in page
     assert {path.name for path in Path("pictures").iterdir()} == {"allan.svg", "spectrum.svg"}
 
 

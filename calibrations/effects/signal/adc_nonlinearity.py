@@ -21,8 +21,8 @@ class AdcNonlinearity(Effect):
 
     bow = Parameter("{out}", typical=0.002, per_axis=False, measured="y", doc="deviation at both ends, alike")
     bend = Parameter("{out}", typical=0.002, per_axis=False, measured="y", doc="deviation at both ends, opposite")
-    middle = Constant(lambda table: float(np.min(table.outputs) + np.max(table.outputs)) / 2)
-    half_span = Constant(lambda table: float(np.ptp(table.outputs)) / 2)
+    middle = Constant(lambda table: float(np.min(table.outputs) + np.max(table.outputs)) / 2, doc="middle of outputs")
+    half_span = Constant(lambda table: float(np.ptp(table.outputs)) / 2, doc="half of their range")
 
     def output(self, v: Array, table: Table, p: Values) -> Array:
         u = (v - p.middle) / p.half_span

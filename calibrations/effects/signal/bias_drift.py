@@ -44,7 +44,7 @@ class BiasDrift(Effect):
     wave_7 = _half_waves(7)
     middle_s = Constant(lambda table: float(np.min(table.time_s) + np.ptp(table.time_s) / 2))
     span_s = Constant(lambda table: float(np.ptp(table.time_s)) or 1.0)
-    wanders = Constant(lambda table: float(_wanders(table)))
+    wanders = Constant(lambda table: float(_wanders(table)), doc="also wanders in waves (1: yes, 0: no)")
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
         elapsed_s = table.time_s - p.middle_s

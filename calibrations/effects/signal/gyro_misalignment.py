@@ -45,9 +45,9 @@ class GyroMisalignment(Effect):
     yz = _lean("y", "z")
     zx = _lean("z", "x")
     zy = _lean("z", "y")
-    turned_x = Constant(partial(is_turned, axis=0))
-    turned_y = Constant(partial(is_turned, axis=1))
-    turned_z = Constant(partial(is_turned, axis=2))
+    turned_x = Constant(partial(is_turned, axis=0), doc="turns about x measured (1: yes, 0: no)")
+    turned_y = Constant(partial(is_turned, axis=1), doc="turns about y measured (1: yes, 0: no)")
+    turned_z = Constant(partial(is_turned, axis=2), doc="turns about z measured (1: yes, 0: no)")
 
     def force(self, a: Array, table: Table, p: Values) -> Array:
         axes: Array = np.zeros((3, 3))

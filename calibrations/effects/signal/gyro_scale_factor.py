@@ -28,10 +28,10 @@ class GyroScaleFactor(Effect):
     kinds = ("rates", "turns")
 
     scale = Parameter("{out}/(deg/s)", typical=1.0, where="turned", guess=rate_scales, doc="change of output per deg/s")
-    turned_x = Constant(partial(is_turned, axis=0))
-    turned_y = Constant(partial(is_turned, axis=1))
-    turned_z = Constant(partial(is_turned, axis=2))
-    assumed = Constant(_mean_of_turned)
+    turned_x = Constant(partial(is_turned, axis=0), doc="turns about x measured (1: yes, 0: no)")
+    turned_y = Constant(partial(is_turned, axis=1), doc="turns about y measured (1: yes, 0: no)")
+    turned_z = Constant(partial(is_turned, axis=2), doc="turns about z measured (1: yes, 0: no)")
+    assumed = Constant(_mean_of_turned, doc="scale of an axis without turns: the mean of the others")
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
         turned = np.array([p[f"turned_{axis}"] for axis in AXES]) > 0

@@ -4,7 +4,7 @@ import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
 from calibrations.geometry.orientation import other_in_plane
-from calibrations.geometry.stage_path import STATED_APPROACH, sensed_turning_points, with_approach
+from calibrations.geometry.stage_path import APPROACH_DOC, STATED_APPROACH, sensed_turning_points, with_approach
 from calibrations.table import Array, Table
 
 LEAST_REACH_G = 1e-3
@@ -52,7 +52,7 @@ class Hysteresis(Effect):
         "1", typical=1.0, low=-1.0, high=1.0, assumed=0.0, doc="share of the slip force held before the first pose"
     )
 
-    approach_deg = Constant(lambda _: STATED_APPROACH)  # from where beta comes; a search may find it
+    approach_deg = Constant(lambda _: STATED_APPROACH, doc=APPROACH_DOC)  # a search may find it
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
         path = sensed_turning_points(with_approach(table, float(p.approach_deg)), a)

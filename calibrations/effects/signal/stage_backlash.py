@@ -4,7 +4,7 @@ import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
 from calibrations.geometry.orientation import Pose
-from calibrations.geometry.stage_path import STATED_APPROACH, last_turn, with_approach
+from calibrations.geometry.stage_path import APPROACH_DOC, STATED_APPROACH, last_turn, with_approach
 from calibrations.table import Table
 
 
@@ -24,7 +24,7 @@ class StageBacklash(Effect):
     needs = ("direction",)
 
     half_play = Parameter("deg", typical=0.2, per_axis=False, doc="lag of beta behind its motor")
-    approach_deg = Constant(lambda _: STATED_APPROACH)  # from where beta comes; a search may find it
+    approach_deg = Constant(lambda _: STATED_APPROACH, doc=APPROACH_DOC)  # a search may find it
 
     def pose(self, pose: Pose, table: Table, p: Values) -> Pose:
         side = last_turn(with_approach(table, float(p.approach_deg)))

@@ -1,7 +1,7 @@
 import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
-from calibrations.effects.logged import follows_level, level
+from calibrations.effects.logged import LEVEL_DOC, follows_level, level
 from calibrations.table import Array, Table
 
 
@@ -20,7 +20,7 @@ class SupplySensitivity(Effect):
 
     share = Parameter("1", typical=1.0, doc="relative change of the output over that of the supply")
     reference_v = Constant(lambda table: float(np.mean(table.column("supply_v"))))
-    level = Constant(lambda table: follows_level(table, ["supply_v"]))  # 1: without the scatter of the readings
+    level = Constant(lambda table: follows_level(table, ["supply_v"]), doc=LEVEL_DOC)
 
     def output(self, v: Array, table: Table, p: Values) -> Array:
         supply_v = level(table, "supply_v") if p.level else table.column("supply_v")

@@ -1,7 +1,7 @@
 import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
-from calibrations.effects.logged import follows_level, sensor_temperature_c
+from calibrations.effects.logged import LEVEL_DOC, follows_level, sensor_temperature_c
 from calibrations.table import Array, Table
 
 
@@ -21,8 +21,8 @@ class TemperatureBias(Effect):
     needs = ("temperature_c",)
 
     slope = Parameter("{out}/K", typical=0.005, doc="output per kelvin")
-    lead_s = Constant(lambda _: 0.0)  # by which the sensor is ahead of the thermometer; a search finds it
-    level = Constant(lambda table: follows_level(table, ["temperature_c"]), assumed=0.0)  # 1: without scatter
+    lead_s = Constant(lambda _: 0.0, doc="lead of the sensor before the thermometer (s)")  # a search finds it
+    level = Constant(lambda table: follows_level(table, ["temperature_c"]), assumed=0.0, doc=LEVEL_DOC)
     reference_c = Constant(lambda table: float(np.mean(table.column("temperature_c"))))
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:

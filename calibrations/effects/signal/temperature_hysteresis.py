@@ -3,7 +3,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
-from calibrations.effects.logged import sensor_temperature_c
+from calibrations.effects.logged import LEVEL_DOC, sensor_temperature_c
 from calibrations.table import Array, Table
 
 PARTS = (0.05, 0.15, 0.35)  # of the range of temperatures: plays to begin with
@@ -36,7 +36,7 @@ class TemperatureHysteresis(Effect):
         guess=lambda table: np.outer(PARTS, np.full(len(table.axes), np.ptp(table.column("temperature_c")))),
         doc="half of its width",
     )
-    level = Constant(lambda _: 0.0, assumed=0.0)  # 1: without the scatter of the readings; a search sets it
+    level = Constant(lambda _: 0.0, assumed=0.0, doc=LEVEL_DOC)  # a search sets it
     reference_c = Constant(lambda table: float(np.mean(table.column("temperature_c"))))
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:

@@ -1,7 +1,7 @@
 import numpy as np
 
 from calibrations.effects import Constant, Effect, Parameter, Values
-from calibrations.effects.logged import follows_level, sensor_temperature_c
+from calibrations.effects.logged import LEVEL_DOC, follows_level, sensor_temperature_c
 from calibrations.table import Array, Table
 
 
@@ -23,10 +23,8 @@ class TemperatureScale(Effect):
     needs = ("temperature_c",)
 
     slope = Parameter("{out}/g/K", typical=0.001, doc="scale factor per kelvin")
-    lead_s = Constant(lambda _: 0.0)  # by which the sensor is ahead of the thermometer; a search finds it
-    level = Constant(  # 1: without the scatter of the readings
-        lambda table: follows_level(table, ["temperature_c"], scales=True), assumed=0.0
-    )
+    lead_s = Constant(lambda _: 0.0, doc="lead of the sensor before the thermometer (s)")  # a search finds it
+    level = Constant(lambda table: follows_level(table, ["temperature_c"], scales=True), assumed=0.0, doc=LEVEL_DOC)
     reference_c = Constant(lambda table: float(np.mean(table.column("temperature_c"))))
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:

@@ -4,7 +4,7 @@ import numpy as np
 import scipy  # its rooms are loaded where they are first entered: a list of effects needs none
 
 from calibrations.effects import Constant, Effect, Parameter, Values
-from calibrations.effects.logged import follows_level, level
+from calibrations.effects.logged import LEVEL_DOC, follows_level, level
 from calibrations.table import Array, Table
 
 SECOND = 1.0
@@ -32,8 +32,8 @@ class VibrationRectification(Effect):
     incidental = True
 
     coefficient = Parameter("{out}/g^2", typical=1.0, doc="shift per mean square of the acceleration")
-    output_per_g = Constant(_output_per_g)
-    level = Constant(lambda table: follows_level(table, table.std_names, 2))  # 1: mean squares without their scatter
+    output_per_g = Constant(_output_per_g, doc="scale factor by which deviations become accelerations")
+    level = Constant(lambda table: follows_level(table, table.std_names, 2), doc=LEVEL_DOC)
 
     def lacks(self, table: Table) -> str | None:
         if table.kind != "poses":

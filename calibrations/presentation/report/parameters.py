@@ -10,10 +10,11 @@ from markupsafe import Markup
 
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.matrices import calibration_matrices
-from calibrations.model import Estimate
+from calibrations.model import Estimate, Model
 from calibrations.presentation.document import Remark, Section, Table
+from calibrations.presentation.residual import column_label
 from calibrations.table import AXES
-from calibrations.text import bound, estimate_text, in_prefix, minus, unit
+from calibrations.text import as_written, bound, estimate_text, in_prefix, minus, unit, with_times
 
 GENERAL = Markup(
     "G<sub>c</sub> = M (S G<sub>r</sub> + b): from raw outputs G<sub>r</sub> in {raw} to G<sub>c</sub> in "
@@ -37,6 +38,7 @@ def matrices_section(fit: Fit) -> Section | None:
     if matrices is None:
         return None
     raw, calibrated = unit(fit.table.unit), unit(matrices.unit)
+    per_raw = f"({calibrated})/{raw}" if "/" in calibrated else f"{calibrated}/{raw}"
     rows = [
         (
             axis,
@@ -46,7 +48,7 @@ def matrices_section(fit: Fit) -> Section | None:
         )
         for k, axis in enumerate(AXES)
     ]
-    head = ("axis", "M, x", "y", "z", f"S, {calibrated}/{raw}", f"b, {calibrated}")
+    head = ("axis", "M, x", "y", "z", f"S, {per_raw}", f"b, {calibrated}")
     table = Table("General calibration", head, rows, range(1, 6), headed=False)
     text = f"Effects that these matrices cannot hold: {', '.join(matrices.beyond)}."
     remark = (Remark(text),) if matrices.beyond else ()
@@ -58,6 +60,27 @@ def name_of_file(source: str) -> str:
     if PurePath(source).is_absolute() or PureWindowsPath(source).is_absolute():
         return PureWindowsPath(source).name
     return source
+
+
+def constant_facts(constants: Mapping[str, str | float]) -> dict[str, str]:
+    """The constants of data for the provenance, with labels: `constant: sample rate (Hz)`."""
+    return {f"constant: {column_label(name)}": _constant_text(value) for name, value in constants.items()}
+
+
+def _constant_text(value: str | float) -> str:
+    """A number to six digits, a whole one such as a serial number with all; a text with readable times."""
+    if isinstance(value, str):
+        return with_times(value)
+    return as_written(value) if float(value).is_integer() else minus(f"{value:.6g}")
+
+
+def model_facts(model: Model) -> dict[str, str]:
+    """Name and provenance of the given model; files without their folders."""
+    facts = {
+        f"model given: {name.replace('_', ' ')}": with_times(name_of_file(str(value)))
+        for name, value in model.provenance.items()
+    }
+    return {"model given": model.name, **facts}
 
 
 def verdicts(results: Mapping[str, Any]) -> Iterable[Section]:

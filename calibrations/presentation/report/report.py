@@ -20,7 +20,7 @@ from calibrations.discovery.results import Comparison, Discovery
 from calibrations.discovery.summary import probability_text
 from calibrations.discovery.verdict import refinement_text
 from calibrations.fitting.fit import Fit, in_milli, milli_unit, pool_in_milli
-from calibrations.model import Model, Term
+from calibrations.model import Term
 from calibrations.presentation.budget import budget_section
 from calibrations.presentation.chart import Picture
 from calibrations.presentation.charts.discovery import album, brief, error_text
@@ -28,7 +28,15 @@ from calibrations.presentation.document import Block, Code, Items, Page, Remark,
 from calibrations.presentation.formula import formula_html
 from calibrations.presentation.page import html
 from calibrations.presentation.report.motion import motion_page
-from calibrations.presentation.report.parameters import estimate_cells, matrices_section, name_of_file, verdicts
+from calibrations.presentation.report.parameters import (
+    constant_facts,
+    estimate_cells,
+    matrices_section,
+    model_facts,
+    name_of_file,
+    verdicts,
+)
+from calibrations.presentation.residual import column_label
 from calibrations.presentation.views.view import ONLY_ONE
 from calibrations.table import Array
 from calibrations.text import (
@@ -40,6 +48,7 @@ from calibrations.text import (
     minus,
     probability,
     rounded,
+    typeset,
 )
 
 LONG_MIN = 120  # longer durations are given in hours
@@ -54,7 +63,8 @@ def summary(discovery: Discovery[Fit]) -> str:
 def _error(discovery: Discovery[Fit]) -> str:
     start, end, structure = discovery.start, discovery.end, discovery.residual_structure
     (error, floor), unit = pool_in_milli(start), milli_unit(start)
-    rows, pattern = f"{start.table.n} {start.table.type.rows}", f" Remaining: {structure}." if structure else ""
+    rows = f"{start.table.n} {start.table.type.rows}"
+    pattern = f" Remaining: {typeset(structure)}." if structure else ""
     if not discovery.steps:
         return (
             f"On {rows} its rms error is {milli_amount(error, unit, 2)}, {rounded(start.pooled_excess)} × the noise "
@@ -89,7 +99,8 @@ def key_figures(discovery: Discovery[Fit]) -> list[tuple[str, str, str]]:
 
 
 def _error_text(fit: Fit, held_out: float) -> str:
-    return f"{rounded(fit.pooled_excess)} × the noise floor; held-out error {rounded(held_out)} ×"
+    text = f"{rounded(fit.pooled_excess)} × the noise floor; held-out error {rounded(held_out)} ×"
+    return keep_units_together(text)
 
 
 def next_words(e: Experiment) -> str:
@@ -172,7 +183,7 @@ def report(
     album_of_all = album(discovery, comparison, motion) if pictures is None else pictures
     by_name = {picture.name: picture for picture in album_of_all}
     page = Page(
-        headline=discovery.judgement.headline,
+        headline=typeset(discovery.judgement.headline),
         verdict=discovery.outcome.label,
         state=discovery.outcome.value,
         subject=f"Calibration report, model {comparison.fit.model.name}",
@@ -237,11 +248,7 @@ def spread_of_excess(fit: Fit) -> float:
 def _places(comparison: Comparison[Fit]) -> tuple[Block, ...]:
     if not comparison.fails:
         return (NO_PLACE,)
-    signs = {"x the noise": "× the noise", " uV": " µV", " ug": " µg"}
-    texts = [capital(minus(place.text)) for place in comparison.fails]
-    for ascii_sign, sign in signs.items():
-        texts = [text.replace(ascii_sign, sign) for text in texts]
-    return PLACES, Items(texts)
+    return PLACES, Items([capital(typeset(place.text)) for place in comparison.fails])
 
 
 def _errors(fit: Fit) -> Table:
@@ -332,7 +339,12 @@ def _parameters(term: Term, is_added: bool) -> Iterable[tuple[str, ...]]:
     rows = [(e.name, e.axis or shared, *estimate_cells(e, "uncertainty not known")) for e in term.quantities]
     rows += [("curve", axis or shared, f"{n} coefficients", "") for axis, n in term.coefficients.items()]
     rows += [
-        (name, "–", f"{rounded(value, 6)} (a reference value, not fitted)", "")
+        (
+            typeset(term.effect.constant_docs.get(name) or column_label(name)),
+            "–",
+            f"{minus(f'{value:.6g}')} (a reference value, not fitted)",
+            "",
+        )
         for name, value in term.constants.items()
     ]
     for number, row in enumerate(rows):
@@ -345,7 +357,7 @@ def _next(discovery: Discovery[Fit]) -> tuple[Block, ...]:
         command = (Code(experiment.command), next_takes(experiment)) if experiment.command else ()
         return next_words(experiment), *command
     if discovery.outcome.value == "unexplained":
-        return (NO_PROPOSAL.format(structure=discovery.residual_structure),)
+        return (NO_PROPOSAL.format(structure=typeset(discovery.residual_structure or "none")),)
     return (NO_EXPERIMENT,)
 
 
@@ -356,15 +368,9 @@ def _provenance(discovery: Discovery[Fit], date: str, program: str) -> dict[str,
         "kind and size": f"{table.n} {table.type.rows}; columns {', '.join(table.columns)}",
         "SHA-256 of the data": table.digest,
         "local gravity": f"{table.gravity_m_s2:g} m/s²",
-        **{f"constant {name}": value for name, value in table.constants.items() if name != "gravity_m_s2"},
+        **constant_facts({name: value for name, value in table.constants.items() if name != "gravity_m_s2"}),
         **model_facts(model),
         "program": program,
         "date": date,
     }
     return {name: str(value) for name, value in facts.items()}
-
-
-def model_facts(model: Model) -> dict[str, str]:
-    """Name and provenance of the given model; files without their folders."""
-    facts = {f"model given: {name}": name_of_file(str(value)) for name, value in model.provenance.items()}
-    return {"model given": model.name, **facts}

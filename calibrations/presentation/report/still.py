@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from calibrations.discovery.results import Comparison, Discovery
+from calibrations.noise.analysis import NoiseAnalysis
 from calibrations.noise.comparison import mismatch
+from calibrations.noise.dataset import NoiseFindings
 from calibrations.noise.fit import NoiseFit
 from calibrations.noise.record import of_record
 from calibrations.presentation.chart import Picture
 from calibrations.presentation.document import Block, Code, Items, Page, Remark, Section, Table
+from calibrations.presentation.noise_text import typeset_coefficients
 from calibrations.presentation.page import html
-from calibrations.presentation.report.parameters import estimate_cells, name_of_file
-from calibrations.presentation.report.report import model_facts
+from calibrations.presentation.report.parameters import constant_facts, estimate_cells, model_facts, name_of_file
 from calibrations.presentation.views.still import gains
-from calibrations.text import capital, join_words, probability, rounded
+from calibrations.text import capital, join_words, probability, rounded, typeset
 
 MISMATCH = (
     "Mismatch: rms difference between the spectrum and the model, relative to the scatter by chance. Other half: the "
@@ -30,6 +32,11 @@ ALONE = (
     "no effect is missing."
 )
 
+COEFFICIENTS = (
+    "By all processes that the search found, without the disturbances that could be removed. The digits in brackets "
+    "are the standard uncertainty of the last digits. N, B, K and Q are the usual symbols of these coefficients."
+)
+
 
 def still_report(
     discovery: Discovery[NoiseFit],
@@ -41,7 +48,7 @@ def still_report(
     """The page as HTML text; the same arguments give the same page."""
     return html(
         Page(
-            headline=discovery.judgement.headline,
+            headline=typeset(discovery.judgement.headline),
             verdict=discovery.outcome.label,
             state=discovery.outcome.value,
             subject=f"Noise report, model {discovery.start.model.name}",
@@ -65,7 +72,7 @@ def _sections(
     )
     yield Section("Mismatch by model", (steps, Remark(MISMATCH)))
     yield Section("Measurement and model", pictures)
-    fails = [capital(place.text) for place in comparison.fails]
+    fails = [capital(typeset(place.text)) for place in comparison.fails]
     name = discovery.start.model.name
     yield Section(f"Mismatch of the model {name}", (PLACES, Items(fails)) if fails else (NO_PLACE,))
     if discovery.findings.candidates:
@@ -75,8 +82,21 @@ def _sections(
     coefficients = ("effect", "parameter", "axis", "value (standard uncertainty)", "unit")
     title = "The model, extended" if discovery.steps else "The model"
     yield Section(title, (discovery.end.model.name, Table("Coefficients", coefficients, rows, headed=False)))
+    yield from _noise_coefficients(discovery)
     if (experiment := discovery.next_experiment) is not None:
         yield Section("Next experiment", (f"{capital(experiment.why)}.", Code(experiment.command)))
+
+
+def _noise_coefficients(discovery: Discovery[NoiseFit]) -> Iterable[Section]:
+    """N, B, K and further coefficients by the processes that the search found: those of `rig noise`."""
+    findings = discovery.findings
+    if not isinstance(findings, NoiseFindings):
+        return
+    still, blocks = discovery.start.still, list[Block]()
+    for axis, noise in NoiseAnalysis(still, findings.search).channels.items():
+        (head, rows), density = typeset_coefficients(noise, still.sensed.get(axis))
+        blocks += [Table(f"Axis {axis}", head, rows), density]
+    yield Section("Noise coefficients", (*blocks, Remark(COEFFICIENTS)))
 
 
 def _candidates(discovery: Discovery[NoiseFit]) -> tuple[Block, ...]:
@@ -108,7 +128,7 @@ def _summary(discovery: Discovery[NoiseFit]) -> str:
         )
     else:
         text += f"The mismatch of the spectrum is {rounded(discovery.start.pooled_excess)} times the scatter by chance."
-    return f"{text} {discovery.judgement.text}"
+    return f"{text} {typeset(discovery.judgement.text)}"
 
 
 def _mismatch_text(fit: NoiseFit) -> str:
@@ -136,7 +156,7 @@ def _provenance(discovery: Discovery[NoiseFit], date: str, program: str) -> dict
         "data": name_of_file(still.source),
         "kind and size": f"still record, {still.n} samples of {len(still.channels)} channels at {still.rate_hz:.6g} Hz",
         "SHA-256 of the samples": still.digest,
-        **{f"constant {name}": str(value) for name, value in still.constants.items()},
+        **constant_facts(still.constants),
         **model_facts(model),
         "program": program,
         "date": date,

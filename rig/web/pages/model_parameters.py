@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -14,9 +13,9 @@ from nicegui import ui
 from calibrations.model.file import dump_model
 from calibrations.noise.analysis import NoiseAnalysis
 from calibrations.noise.dataset import NoiseFindings
-from calibrations.presentation.noise_text import coefficient_table, density
+from calibrations.presentation.noise_text import typeset_coefficients
 from calibrations.presentation.parameter_table import HEAD, STRONG, correlations, parameter_rows, tab_separated
-from calibrations.text import minus, unit
+from calibrations.text import minus
 from rig.web.calculations import off_loop
 from rig.web.pages.model_documents import CertificateDialog, CompensationDialog
 from rig.web.parts import afresh, box, button, div, for_page, message, notify_error, table, wide_table, words
@@ -92,10 +91,10 @@ class ParametersBox:
         with afresh(self.noise):
             for axis, noise in NoiseAnalysis(still, findings.search).channels.items():
                 words(f"Noise coefficients of {axis}, by all processes that the search found", "title")
-                head, rows = coefficient_table(noise, still.sensed.get(axis))
+                (head, rows), density = typeset_coefficients(noise, still.sensed.get(axis))
                 with wide_table().classes("coefficients"):
-                    table(("", *head), [(SYMBOLS.get(row[0], ""), *map(_page_text, row)) for row in rows])
-                words(_page_text(density(noise, still.sensed.get(axis))), "quiet small")
+                    table(head, rows)
+                words(density, "quiet small")
 
     async def copy(self) -> None:
         """Copy the table for a spreadsheet."""
@@ -124,9 +123,6 @@ class ParametersBox:
             CompensationDialog(self.page.session)
 
 
-SYMBOLS = {"white-noise": "N", "flicker-noise": "B", "rate-random-walk": "K", "quantisation-noise": "Q"}
-
-
 def _cells(row: ParameterRow) -> list[Callable[[], None]]:
     """The cells in the order of `HEAD`."""
     texts = (row.effect, row.name, row.axis, row.value, row.std, row.unit, row.change)
@@ -141,11 +137,6 @@ def _cell(row: ParameterRow, name: str, text: str) -> None:
             ui.tooltip(row.doc)
     if row.why and name == "value":
         words(f"because {for_page(row.why)}", "quiet small why-not")
-
-
-def _page_text(text: str) -> str:
-    """A coefficient of the terminal with the signs of the page: µV/√Hz."""
-    return re.sub(r"\bu(?=[Vg]\b)", "µ", unit(for_page(text)))
 
 
 def _pairs(correlated: list[CorrelatedPair]) -> None:
