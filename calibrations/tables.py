@@ -108,7 +108,8 @@ class Fields(Positions):
 class Rates(Kind):
     """A gyroscope on a rate table: the angular rate about each axis is known."""
 
-    name = file = rows = size_in = "rates"
+    name = file = "rates"
+    rows = size_in = "turns and rests"
     columns = (("rate_deg_s", "gx", "gy", "gz"),)
     outputs = ("gx", "gy", "gz")
     input_unit = "deg/s"

@@ -76,7 +76,7 @@ class Run:
         return {
             "poses": f"{self.rows} poses",
             "positions": f"{self.rows} positions",
-            "rates": f"{self.rows} turns",
+            "rates": f"{self.rows} turns and rests",
             "turns": f"{self.rows} turns and rests",
         }.get(self.kind, f"{self.rows} poses and blocks")
 

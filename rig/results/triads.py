@@ -46,11 +46,12 @@ def rate_turn(measured: MeasuredRun) -> dict[str, Result | Missing]:
     results = gyroscope(fit)
     scales = {e.axis: e for e in fit.model.estimates("gyro-scale-factor")}
     residuals = dict(zip(fit.channels, rms(fit.residual), strict=True))
-    for axis, scale in scales.items():
-        if scale.identified and scale.value:
-            for e in (e for e in fit.model.estimates("gyro-g-sensitivity") if e.axis == axis):
-                results[f"gyro-g-sensitivity-{axis}{e.name}"] = result(e, "(deg/s)/g", scale.value)
-            results[f"rate-residual-{axis}"] = Result(abs(float(residuals[axis]) / scale.value), "deg/s")
+    known_scales = {axis: scale.value for axis, scale in scales.items() if scale.identified and scale.value}
+    for e in sorted(fit.model.estimates("gyro-g-sensitivity"), key=lambda e: e.axis):
+        if e.axis in known_scales:
+            results[f"gyro-g-sensitivity-{e.axis}{e.name}"] = result(e, "(deg/s)/g", known_scales[e.axis])
+    for axis, scale in known_scales.items():
+        results[f"rate-residual-{axis}"] = Result(abs(float(residuals[axis]) / scale), "deg/s")
     complete = measured.run.settings["mounts"] == len(EDGES)
     return {name: value for name, value in results.items() if complete or isinstance(value, Result)}
 

@@ -95,7 +95,13 @@ def test_one_horizontal_turn_says_what_it_cannot_show(rig: Rig, folder: Path) ->
 
 @pytest.mark.sockets
 def test_a_gyroscope_is_calibrated_about_three_edges(rig: Rig, folder: Path) -> None:
-    found = run(rig, folder, RATES)["results"]
+    document = run(rig, folder, RATES)
+    found = document["results"]
+    assert list(found)[-12:] == [
+        *(f"gyro-g-sensitivity-{axis}{along}" for axis in "xyz" for along in "xyz"),
+        *(f"rate-residual-{axis}" for axis in "xyz"),
+    ]
+    assert " turns and rests" in rig("runs").out
     for axis in "xyz":
         assert found[f"gyro-scale-{axis}"]["value"] == pytest.approx(6.04e-3, rel=0.01)
         assert found[f"gyro-scale-{axis}"]["unit"] == "V/(deg/s)"
