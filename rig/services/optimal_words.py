@@ -32,7 +32,11 @@ def plan_rows(optimum: Optimal) -> list[tuple[str, ...]]:
 def savings(optimum: Optimal) -> Iterator[str]:
     """How much less time the rig needs."""
     yield f"{optimum.times_less:.1f} times less rig time for the same worst standard error ({_worst(optimum)})."
-    yield f"{_times(optimum.times_less_for_all)} if no parameter becomes less certain: {_standard_plan_text(optimum)}."
+    for_all = optimum.all_equal
+    yield (
+        f"With a dwell of {for_all.dwell_s:g} s at these poses, no parameter becomes less certain. The rig time is "
+        f"then {duration(for_all.plan.duration_s)}, {_times(optimum.times_less_for_all)} that of the standard sweep."
+    )
     if undetermined := [
         optimum.over.name(k) for k, is_determined in enumerate(optimum.standard.determined) if not is_determined
     ]:
@@ -64,8 +68,6 @@ def _worst(optimum: Optimal) -> str:
 
 
 def _times(ratio: float) -> str:
-    return f"{ratio:.1f} times less" if ratio >= 1 else f"{1 / ratio:.1f} times more"
-
-
-def _standard_plan_text(optimum: Optimal) -> str:
-    return f"{optimum.all_equal.dwell_s:g} s a pose, {duration(optimum.all_equal.plan.duration_s)}"
+    if f"{max(ratio, 1 / ratio):.1f}" == "1.0":
+        return "about"
+    return f"{ratio:.1f} times less than" if ratio >= 1 else f"{1 / ratio:.1f} times"

@@ -14,6 +14,7 @@ import pytest
 
 from calibrations.effects.catalogue import catalogue
 from calibrations.model.file import read_model
+from calibrations.text import duration
 from procedures.catalogue import find
 from procedures.pose_list import format_poses
 from procedures.session import Pose
@@ -25,6 +26,7 @@ from rig.planning.optimal import AGAIN, CHECK, DESIGN, Optimal, most_relative, o
 from rig.planning.planned import EXCHANGE_S, from_home_s, moves_s
 from rig.record import KeptPose, Record
 from rig.runs.runner import resume, start
+from rig.services.optimal_words import _times
 from tests.rig.conftest import Rig
 from tests.rig.rigging import Onlooker
 from tests.slow import first_fast
@@ -124,7 +126,18 @@ def test_people_are_told_what_it_saves_and_how_to_run_it() -> None:
     assert "physical, 16 parameters: I-optimal poses" in text
     assert "times less rig time for the same worst standard error" in text
     assert "any standard error, relative to the sweep, at most" in text
+    for_all = chosen("physical").all_equal
+    time = duration(for_all.plan.duration_s)
+    sentence = f"{for_all.dwell_s:g} s at these poses, no parameter becomes less certain. The rig time is then {time}, "
+    assert sentence in text
     assert f"rig run sweep --pose-list poses.csv --dwell-s {chosen('physical').equal.dwell_s:g}" in text
+
+
+@pytest.mark.parametrize(
+    ("times_less", "words"), [(1.8, "1.8 times less than"), (0.5, "2.0 times"), (1.03, "about"), (0.97, "about")]
+)
+def test_rig_times_are_compared_in_words(times_less: float, words: str) -> None:
+    assert _times(times_less) == words
 
 
 def test_the_printed_run_is_of_the_bench_that_was_planned_on() -> None:

@@ -44,7 +44,7 @@ class OptimalDialog:
             with div("row-of"):
                 self.model = ui.select(models("linear", None), label="Model", value="linear")
                 self.poses = ui.number("Poses (empty: a quarter)", min=1, max=60, precision=0).props("dense")
-                self.criterion = ui.select(CRITERIA, label="Smallest", value="I").props("dense options-dense")
+                self.criterion = ui.select(CRITERIA, label="Make smallest", value="I").props("dense options-dense")
                 for field in (self.model.props("dense options-dense"), self.poses, self.criterion):
                     field.classes("grow")
             self.place = div("stack")
