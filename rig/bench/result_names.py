@@ -23,8 +23,9 @@ def _names_of_pairs(name: str, meaning: str, pairs: Iterable[Sequence[str]]) -> 
 
 LEVEL_OFFSET = "Error of the level itself; the half turn removes it from the tilt."
 BIAS, SCALE = "Output at zero input.", "Output for each unit of input."
+BETWEEN = "Departure of the angle between the sensing axes {0} and {1} from 90 deg."
 NONORTHOGONALITY = "Departure of the angle between two sensing axes from 90 deg."
-HARD_IRON, SOFT_IRON = "Constant field of the sensor.", "Relative distortion of the field by iron."
+HARD_IRON, SOFT_IRON = "Constant field of the sensor.", "Relative distortion of the field by iron, {0}{1}."
 SOFT_IRON_PAIRS = ("xx", "yy", "xy", "xz", "yz")
 FIELD = "Magnitude of the field."
 MAGNITUDE_ERROR = "Error of the magnitude that remains, in thousandths of the field."
@@ -35,11 +36,13 @@ STEADY_STATE = {
     "steady-state-expected": "Forecast: the most likely time.",
     "steady-state-latest": "Forecast: not later than this (97.5 %).",
 }
+NORTH = "Direction of magnetic north, clockwise from the x axis of the base."
+
 RESULTS: Mapping[str, Mapping[str, str]] = {  # name -> meaning, by procedure
     "check-standard": _names_of_axes({"bias-{axis}": BIAS, "scale-{axis}": SCALE}),
     "hand-positions": {
         **_names_of_axes({"bias-{axis}": BIAS, "scale-{axis}": SCALE}),
-        **_names_of_pairs("nonorthogonality", NONORTHOGONALITY, combinations(AXES, 2)),
+        **_names_of_pairs("nonorthogonality", BETWEEN, combinations(AXES, 2)),
         "uncertainty": "Largest standard uncertainty of the results above, as an error at 1 g.",
     },
     "hand-fields": {
@@ -62,7 +65,7 @@ RESULTS: Mapping[str, Mapping[str, str]] = {  # name -> meaning, by procedure
             "level-{axis}": "Tilt of the table along this axis of the level.",
             "level-offset-{axis}": LEVEL_OFFSET,
             "base-{axis}": "Tilt of the base along this axis of the level.",
-            "base-offset-{axis}": LEVEL_OFFSET,
+            "base-offset-{axis}": f"{LEVEL_OFFSET.removesuffix('.')} of the base.",
         }
     ),
     "magnetometer-turn": {
@@ -78,12 +81,12 @@ RESULTS: Mapping[str, Mapping[str, str]] = {  # name -> meaning, by procedure
         "field-total": FIELD,
         "field-inclination": "Angle of the field below the horizontal.",
         "field-declination": "Magnetic north, clockwise from true north.",
-        **dict.fromkeys(("field-horizontal", "field-horizontal-by-hand"), "Horizontal part of the field."),
-        **dict.fromkeys(
-            ("field-azimuth", "field-azimuth-by-hand"),
-            "Direction of magnetic north, clockwise from the x axis of the base.",
-        ),
-        **dict.fromkeys(("left-by-ellipsoid", "left-by-hand"), MAGNITUDE_ERROR),
+        "field-horizontal": "Horizontal part of the field.",
+        "field-horizontal-by-hand": "Horizontal part of the field, from the extremes of the turn.",
+        "field-azimuth": NORTH,
+        "field-azimuth-by-hand": f"{NORTH.removesuffix('.')}, from the extremes of the turn.",
+        "left-by-ellipsoid": MAGNITUDE_ERROR,
+        "left-by-hand": f"{MAGNITUDE_ERROR.removesuffix('.')}, with the values from the extremes of each turn.",
     },
     "misalignment": {
         **_names_of_pairs("theta", "Component of sensing axis {0} along reference axis {1}.", product("xy", AXES)),
@@ -129,8 +132,8 @@ RESULTS: Mapping[str, Mapping[str, str]] = {  # name -> meaning, by procedure
     },
     "repeat": _names_of_axes(
         {
-            f"{quantity}-{kind}-{{axis}}": f"Scatter of repetitions {change}."
-            for quantity in ("bias", "scale")
+            f"{short}-{kind}-{{axis}}": f"Scatter of the {quantity} over repetitions {change}."
+            for short, quantity in (("bias", "bias"), ("scale", "scale factor"))
             for kind, change in {
                 "as-is": "without any change",
                 "power": "with power off and on in between",
@@ -164,7 +167,7 @@ RESULTS: Mapping[str, Mapping[str, str]] = {  # name -> meaning, by procedure
             "bias-temperature-{axis}": "Change of the bias for each kelvin.",
             "bias-temperature-hysteresis-{axis}": "Bias on the way up less bias on the way down in temperature.",
             "scale-temperature-{axis}": "Relative change of the scale factor for each kelvin.",
-            "scale-temperature-hysteresis-{axis}": "The same difference of the scale factor, relative.",
+            "scale-temperature-hysteresis-{axis}": "Relative difference of the scale factor, way up less way down.",
         }
     ),
 }

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from rig.bench.result_names import RESULTS, label
 from rig.files import home
 from rig.record import Record
 from rig.runs.background.status import Status
@@ -74,6 +76,12 @@ def test_a_notification_has_no_commands() -> None:
 
 def _result(value: float, limit: object = None, std: float | None = None) -> dict[str, object]:
     return {"value": value, "std": std, "unit": "h", "limit": limit, "verdict": "fail" if limit else None}
+
+
+@pytest.mark.parametrize("procedure", sorted(RESULTS))
+def test_every_result_of_a_procedure_has_a_label_of_its_own(procedure: str) -> None:
+    labels = Counter(label(procedure, name) for name in RESULTS[procedure])
+    assert [text for text, count in labels.items() if count > 1] == []
 
 
 def test_the_steady_state_is_one_sentence() -> None:
