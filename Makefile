@@ -1,5 +1,6 @@
 # make demo: the whole story on the simulated rig.   make test: what is checked before a commit, in minutes.
 # make test-all: the long statistics, kills, browser and fuzzing as well: everything that CI checks.
+# make test-release: searches of minutes each and statistics of many seeds, before a release.
 # make docs: the documentation site, into out/docs/index.html; its notebooks are executed when they have changed.
 # make audit: known weaknesses of the pinned dependencies; needs the network, so it is no part of make test.
 # Strict: an index that knows no weaknesses is no reason to find none.
@@ -8,17 +9,20 @@ BIN := .venv/bin
 # Compiled modules are kept: each process of the tests would compile all of them anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-all setup bench docs lint audit clean
+.PHONY: demo test test-all test-release setup bench docs lint audit clean
 
 demo: .venv/program
 	$(BIN)/rig demo --folder out/demo --force
 
 # Worksteal: neighbours in a file run in one process, which then works out only once what they share.
 test: setup lint
-	$(BIN)/pytest -n auto --dist worksteal -m "not slow"
+	$(BIN)/pytest -n auto --dist worksteal -m "not slow and not release"
 
 test-all: test
-	$(BIN)/pytest -n auto --dist worksteal -m slow
+	$(BIN)/pytest -n auto --dist worksteal -m "slow and not release"
+
+test-release: setup
+	$(BIN)/pytest -n auto --dist worksteal -m release
 
 lint: setup
 	$(BIN)/ruff check .

@@ -1,4 +1,4 @@
-"""Cases of a battery: some run with every `make test`, the others only with `make test-all`."""
+"""Cases of a battery: some run with every `make test`, others with `make test-all`, the longest before a release."""
 
 from __future__ import annotations
 
@@ -11,6 +11,11 @@ import pytest
 def slow(values: Iterable[Any]) -> list[Any]:
     """Cases that only `make test-all` runs; a case of several values is a tuple."""
     return [pytest.param(*(v if isinstance(v, tuple) else (v,)), marks=pytest.mark.slow) for v in values]
+
+
+def before_release(values: Iterable[Any]) -> list[Any]:
+    """Cases that take minutes, which only `make test-release` runs; a case of several values is a tuple."""
+    return [pytest.param(*(v if isinstance(v, tuple) else (v,)), marks=pytest.mark.release) for v in values]
 
 
 def first_fast(values: Iterable[Any], fast: int = 1) -> list[Any]:

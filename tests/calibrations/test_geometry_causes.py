@@ -38,7 +38,7 @@ def test_zeros_of_the_stages_are_no_misalignment_beside_a_large_nonlinearity(bet
     assert found.end.params["stage-zero-offset.beta"].value == pytest.approx(beta_deg, abs=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_backlash_of_its_own_form_leaves_non_orthogonality_its_name() -> None:
     side = np.where(np.diff(TURN["beta_deg"], prepend=TURN["beta_deg"][0] - 1) >= 0, 1.0, -1.0)
     force = forces(beta_deg=0.3 * side)

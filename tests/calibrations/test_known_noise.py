@@ -40,7 +40,7 @@ def sweep(seed: int, square: float = 0.0) -> Table:
     return poses(columns, 2.5 + x + square * x**2 + slow[0], 2.5 + y + square * y**2 + slow[1], seed=seed)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_false_alarms_fall_where_the_noise_is_known() -> None:
     tables = [sweep(seed) for seed in range(4)]
     guessed = [diagnose(table, read_model("linear")).verdict for table in tables]

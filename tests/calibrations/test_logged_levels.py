@@ -105,7 +105,7 @@ def test_standard_deviations_that_only_scatter_have_no_level() -> None:
     assert known <= 2
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_vibration_of_a_noisy_estimate_has_one_name_and_its_whole_size() -> None:
     found = discover(vibrating(20 * synthetic.NOISE_V))
     assert found.causes == ("vibration-rectification",)

@@ -9,7 +9,7 @@ import pytest
 
 from tests.hidden.intervals import of_rigs, share
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.release
 
 RIGS = 14  # some 100 intervals: chance alone moves their share by 2 %
 

@@ -117,7 +117,7 @@ def test_what_took_anothers_place_has_it_as_its_rival() -> None:
     assert "warm-up-bias" in found.alternatives["temperature-bias"]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_what_comes_before_a_coarse_converter_is_seen_through_its_stairs() -> None:
     """Edges that lie where another effect puts them tell nothing of it by their slope."""
     found = diagnose(case("triple", 10, 4010)[0], read_model("linear"))
