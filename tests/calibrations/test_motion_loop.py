@@ -12,7 +12,7 @@ from calibrations.model import Model
 from calibrations.model.file import parse_model, read_model
 from calibrations.table import Table
 from tests.calibrations import shaken
-from tests.slow import first_fast
+from tests.slow import before_release, first_fast, slow
 
 LINEAR = read_model("linear")
 ATTITUDES = ((45.0, 90.0), (90.0, 0.0), (90.0, 180.0), (90.0, 90.0), (90.0, 270.0), (135.0, 45.0))
@@ -25,7 +25,7 @@ def value(model: Model, effect: str, name: str, axis: str = "x") -> tuple[float,
     return found.value, found.std or np.inf
 
 
-@pytest.mark.parametrize("records", first_fast([10, 50]))
+@pytest.mark.parametrize("records", [10, *before_release([50])])
 def test_a_clean_record_misses_nothing(records: int) -> None:
     excesses, p_values = [], []
     for seed in range(records):
@@ -65,7 +65,7 @@ def test_parameters_are_right_within_their_uncertainty() -> None:
     assert np.all(np.abs(np.std(pulls, axis=0) - 1) < 0.45)
 
 
-@pytest.mark.parametrize("times", first_fast([10, 3, 30]))  # the noise floor
+@pytest.mark.parametrize("times", [10, *slow([3]), *before_release([30])])  # the noise floor
 @pytest.mark.parametrize(
     ("effect", "hidden", "parameter", "true", "noise_v"),
     [

@@ -139,7 +139,7 @@ def test_what_no_effect_describes_has_a_place_and_no_name(cause: sampled.Cause) 
     assert found.steps[-1].held_out_after < 1.15
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_fast_wave_in_time_is_no_drift() -> None:
     """A random walk follows a wave of 7 poses; the wave itself describes the residual better."""
     found = found_with(hummed)

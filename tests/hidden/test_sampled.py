@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Any
 
 import pytest
@@ -34,7 +35,7 @@ CAUSES: dict[str, list[dict[str, Any]]] = {
     "dead-zone": [{"cause": sampled.threshold(width)} for width in (3e-4, 2e-3, 2e-2)],
 }
 FAST = ("warm-up-scale",)  # the others take longer, on the same way
-LATE = [("dead-zone", 2), ("bias-drift", 3)]  # these take minutes
+LATE = [*product(("quantisation", "dead-zone"), (1, 2)), ("bias-drift", 3)]  # these take minutes
 CASES = [
     case
     for name, causes in CAUSES.items()
