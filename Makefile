@@ -45,7 +45,7 @@ audit: setup
 setup: .venv/ready
 
 # Each stamp is newer than what it was made from, so that a second call starts at once. The demo needs the program alone,
-# and compiles those kernels that it uses. Mypy reads the types of the dependencies once, which takes it a minute.
+# and compiles those kernels that it uses. Mypy reads the types of the dependencies once, for a minute, beside the compiler.
 .venv/program: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
@@ -55,8 +55,7 @@ setup: .venv/ready
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test,fleet,docs]'
 	for tool in mbpoll gcc clang chromium; do [ "$$(id -u)" != 0 ] || command -v $$tool >/dev/null || { apt-get -qq update && apt-get -qq install -y $$tool || true; }; done
 	command -v chromium >/dev/null || $(BIN)/python -m playwright install chromium || true
-	$(BIN)/python -m rig.warm
-	$(BIN)/mypy >/dev/null || true
+	{ $(BIN)/mypy >/dev/null || true; } & $(BIN)/python -m rig.warm && wait
 	touch $@
 
 clean:
