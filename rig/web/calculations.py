@@ -6,15 +6,14 @@ import asyncio
 import ctypes
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
-from contextlib import contextmanager
 from contextvars import copy_context
 from dataclasses import dataclass
 from functools import partial
-from threading import Event, Thread, Timer, current_thread
+from threading import Event, Thread
 from typing import Any, Generic, ParamSpec, TypeVar
-from weakref import WeakKeyDictionary
+from weakref import WeakSet
 
 from nicegui import ui
 
@@ -78,8 +77,7 @@ class Visit:
         self.cancel()
 
 
-_CALCULATIONS = WeakKeyDictionary[Thread, Future[Any]]()
-AGAIN_S = 0.01
+_CALCULATIONS = WeakSet[Thread]()
 
 
 @dataclass(frozen=True)
@@ -92,9 +90,9 @@ class Calculation(Generic[R]):
 
     def cancel(self) -> None:
         """Raise Cancelled in the thread at its next line of Python."""
-        if not self.future.done():
+        if not self.future.done() and (number := self.thread.ident) is not None:
             self.is_cancelled.set()
-            _cancel(self.thread, self.future)
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(number), ctypes.py_object(Cancelled))
 
 
 def begin(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> Calculation[R]:
@@ -102,37 +100,9 @@ def begin(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> Calculatio
     future, is_cancelled = Future[R](), Event()
     work = partial(copy_context().run, call, *args, **kwargs)
     thread = Thread(target=_settle, args=(future, work, is_cancelled), name=call.__name__, daemon=True)
-    _CALCULATIONS[thread] = future
+    _CALCULATIONS.add(thread)
     thread.start()
     return Calculation(thread, future, is_cancelled)
-
-
-@contextmanager
-def lasting_cancellations() -> Iterator[None]:
-    """Inside the context a Cancelled that Python discards is raised again, and not printed.
-
-    Python discards what is raised in a finaliser, or in a function that a compiler calls.
-    """
-    hook = sys.unraisablehook
-
-    def recover(unraisable: sys.UnraisableHookArgs) -> None:
-        thread = current_thread()
-        if thread in _CALCULATIONS and issubclass(unraisable.exc_type, Cancelled):
-            Timer(AGAIN_S, _cancel, (thread, _CALCULATIONS[thread])).start()
-        else:
-            hook(unraisable)
-
-    sys.unraisablehook = recover
-    try:
-        yield
-    finally:
-        sys.unraisablehook = hook
-
-
-def _cancel(thread: Thread, future: Future[Any]) -> None:
-    """Raise Cancelled in the thread at its next line of Python, unless its work has ended."""
-    if not future.done() and (number := thread.ident) is not None:
-        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(number), ctypes.py_object(Cancelled))
 
 
 async def off_loop(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:

@@ -26,7 +26,7 @@ from calibrations.table import Table
 from rig.errors import RigError
 from rig.files import home, write_whole
 from rig.runs.signals import signal_handlers
-from rig.web.calculations import begin, lasting_cancellations, leave_calculations
+from rig.web.calculations import begin, leave_calculations
 from rig.web.desk import Desk
 from rig.web.frame import TITLE
 from rig.web.guard import TOKEN, Guard, names
@@ -92,7 +92,7 @@ def serve(desk: Desk, host: str, port: int | None, token: str, ready: Callable[[
     )  # open pages keep their connections, so there is nothing to wait for
     logging.getLogger("uvicorn.error").addFilter(lambda entry: "graceful shutdown" not in entry.getMessage())
     ignored = signal_handlers(lambda *_: None, signal.SIGINT, signal.SIGTERM)  # uvicorn raises them again after its end
-    with ignored, listener, closing(desk), lasting_cancellations():
+    with ignored, listener, closing(desk):
         _Server(config, started).run(sockets=[listener])
     atexit.register(leave_calculations)
 

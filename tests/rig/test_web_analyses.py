@@ -27,7 +27,7 @@ from rig.services.report import make_report
 from rig.services.request import Request
 from rig.services.search import Cancelled, CountedEffects
 from rig.services.session import ModelSession
-from rig.web.calculations import Visit, begin, lasting_cancellations, off_loop
+from rig.web.calculations import Visit, begin, off_loop
 from rig.web.desk import Desk
 from rig.web.pages import register
 from rig.web.pages.run_report import draw_ahead, report_html
@@ -199,47 +199,6 @@ def test_a_cancelled_calculation_ends_at_its_next_line() -> None:
     calculation.thread.join(60)
     assert not calculation.thread.is_alive()
     calculation.cancel()  # after the end: nothing happens
-
-
-def test_a_cancellation_that_python_discards_is_raised_again(
-    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    begun = threading.Event()
-    monkeypatch.setattr(sys, "unraisablehook", sys.__unraisablehook__)
-
-    class Finalised:
-        def __del__(self) -> None:
-            begun.set()
-            while True:
-                pass
-
-    def endless() -> None:
-        Finalised()
-        while True:
-            pass
-
-    with lasting_cancellations():
-        calculation = begin(endless)
-        assert begun.wait(60)
-        calculation.cancel()
-        with pytest.raises(Cancelled):
-            calculation.future.result(60)
-    assert capfd.readouterr().err == ""
-
-
-def test_other_discarded_errors_are_printed(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "unraisablehook", sys.__unraisablehook__)
-
-    class Finalised:
-        def __del__(self) -> None:
-            raise ValueError("a fault")
-
-    def finalise() -> None:
-        Finalised()
-
-    with lasting_cancellations():
-        begin(finalise).future.result(60)
-    assert "a fault" in capfd.readouterr().err
 
 
 def test_what_a_cancellation_becomes_in_compiled_code_is_no_fault() -> None:
