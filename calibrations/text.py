@@ -188,12 +188,12 @@ def size(count: int) -> str:
     return f"{count / 1e6:.1f} MB" if count >= 1e5 else f"{count / 1e3:.1f} kB"
 
 
-# Intervals and limits
-
-
 def with_times(text: str) -> str:
     """The text with times of ISO 8601 in UTC as people read them: `2026-11-29 21:07:36 UTC`."""
     return re.sub(r"(\d{4}-\d\d-\d\d)T(\d\d:\d\d:\d\d)(?:\.\d+)?(?:Z|\+00:00)", r"\1 \2 UTC", text)
+
+
+# Intervals and limits
 
 
 def count_words(number: int, singular: str, plural: str) -> str:

@@ -126,10 +126,11 @@ def drawn_channels(fit: Fit, values: Array) -> list[int]:
 
     Of a motion, those with the largest rms of `values` over the noise floor.
     """
-    size = rms(values) / fit.noise.floor
-    channels = [c for c in range(len(fit.channels)) if size[c] > ROUNDING] or list(range(len(fit.channels)))
+    changed = rms(values) > ROUNDING * fit.noise.floor
+    channels = [c for c in range(len(fit.channels)) if changed[c]] or list(range(len(fit.channels)))
     if not fit.table.type.moving:
         return channels
+    size = rms(values) / fit.noise.floor
     return sorted(sorted(channels, key=lambda c: -float(size[c]))[:MOST_ROWS])
 
 
