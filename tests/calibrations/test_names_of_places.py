@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from calibrations.free_forms.acting_places import _least_size
+from calibrations.free_forms.naming import _orthonormal, _residual_squares
 from calibrations.loop import discover
 from calibrations.model.file import read_model
 from tests.calibrations.synthetic import components, poses, turns
@@ -47,3 +48,16 @@ def test_beside_a_hysteresis_in_another_form_a_place_needs_a_tenth_of_its_size(
     component = SimpleNamespace(place="history", form=form)
     result = SimpleNamespace(active=["history/slip"], component=lambda _: component)
     assert _least_size(result, place, {"history": 20.0, "own-response": 1.0}) == pytest.approx(least)
+
+
+def test_a_curve_is_left_by_a_cause_beside_those_that_were_chosen_as_by_all_together() -> None:
+    random = np.random.default_rng(1)
+    chosen, tried, curve = (random.standard_normal((30, m)) * 10.0 ** np.arange(m) for m in (3, 2, 1))
+    chosen[:, 2] = chosen[:, 0] + chosen[:, 1]  # no direction of its own
+    every = np.hstack([chosen[:, :2], tried])
+    expected = np.linalg.lstsq(every, curve[:, 0], rcond=None)[1].item()
+    companions = _orthonormal([chosen])
+    assert companions.shape == (30, 2)
+    assert _residual_squares([tried], curve[:, 0], companions) == pytest.approx(expected, rel=1e-9)
+    spanned = _residual_squares([chosen[:, :1]], curve[:, 0], companions)
+    assert spanned == pytest.approx(float(np.sum((curve - companions @ (companions.T @ curve)) ** 2)), rel=1e-9)

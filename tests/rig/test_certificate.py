@@ -46,6 +46,7 @@ def test_a_run_gives_all_three_forms(rig: Rig, bench_file: Callable[..., Path], 
     assert "pass (over 99.9 %)" in ended.out
     assert "hand level's certificate L-1 expired" in ended.out
     assert "This document certifies no sensor." in ended.out
+    assert "step (deg)" in (tmp_path / "c.html").read_text(encoding="utf-8")
     assert "Simulated calibration, no certificate" in (tmp_path / "c.html").read_text(encoding="utf-8")
     for form, text in ((".html", "The Lab"), (".xml", "<dcc:city>Town</dcc:city>"), (".pdf", "")):
         path = tmp_path / f"c{form}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -67,6 +68,8 @@ def test_a_night_reaches_its_steady_state_after_hours_and_is_told_on_one_page(
     assert "are steady" in text
     assert "Forecasts of the final values" in text
     assert "steady-state-time" in text
+    assert "; interval (s): 1800; " in text
+    assert re.search(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC", text), "times as people read them"
     assert str(tmp_path) not in text
 
 
