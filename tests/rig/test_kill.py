@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 
 from rig.record import Record
+from rig.runs.signals import stop_source
 from tests.benchmark.kills import number
 from tests.rig.killing import (
     FIELDS,
@@ -115,7 +116,7 @@ def test_a_signal_ends_the_process_with_status_4_and_resume_finishes_the_run(
     stopped = in_own_process(*RUN, harm=signal_at("blocks", 5, name))
     document = json.loads(stopped.stdout)
     assert (stopped.returncode, document["state"]) == (4, "stopped")
-    assert f"({name}); `rig resume {document['run']}` continues the run" in stopped.stderr
+    assert f"{stop_source(name)}; `rig resume {document['run']}` continues the run" in stopped.stderr
     assert "Traceback" not in stopped.stderr
     resumed = nursery.run(rig_home, "resume", document["run"], "--unattended", "--json")
     assert resumed.status == 0, resumed.said
