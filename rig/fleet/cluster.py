@@ -64,11 +64,7 @@ def connect_workers(scheduler: str | None, workers: int | None) -> Iterator[Clie
             with client:
                 yield client
             return
-        with stoppable(), start_cluster(workers) as cluster, Client(cluster) as client:
-            try:
-                client.register_plugin(QuietWorker())
-            except OSError as error:
-                raise FleetError(NOT_STARTED.format(error)) from None
+        with stoppable(), start_cluster(workers) as cluster, start_client(cluster) as client:
             yield client
 
 
@@ -89,6 +85,23 @@ def start_cluster(workers: int | None) -> LocalCluster:
         raise FleetError(NOT_STARTED.format(error)) from None
     finally:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGHUP})
+
+
+def start_client(cluster: LocalCluster) -> Client:
+    """A client of the cluster, whose workers write no messages.
+
+    It makes a name by `uuid.getnode`, which discards any exception, so `stoppable` lets a signal wait for the end of
+    this function. Raises FleetError if a worker cannot be reached.
+    """
+    from distributed import Client
+
+    client = Client(cluster)
+    try:
+        client.register_plugin(QuietWorker())
+    except OSError as error:
+        client.close()
+        raise FleetError(NOT_STARTED.format(error)) from None
+    return client
 
 
 def run_tasks(

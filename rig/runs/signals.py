@@ -23,7 +23,8 @@ ON_A_PAGE = "stopped on a page of the workbench"  # also by SIGINT or SIGTERM, w
 COMPILED_PACKAGE = "drivers.world"  # its compiled code calls Python generators; an exception there would break it
 # Between bytes and their count: the simulated clock would wait for bytes that have come already.
 COUNTERS = (("drivers.clock", "step"), ("drivers.transport.link", "put"), ("drivers.transport.link", "take"))
-CLUSTER_START = ("rig.fleet.cluster", "start_cluster")
+# Their code discards an exception, or could not be closed after one.
+FLEET_STARTS = (("rig.fleet.cluster", "start_cluster"), ("rig.fleet.cluster", "start_client"))
 SCREEN = "rich"  # an exception while its console writes would block the console
 AGAIN_S = 0.001
 Handler = Callable[[int, FrameType | None], object]
@@ -123,7 +124,7 @@ def _indivisible(frame: FrameType | None) -> bool:
     """Whether an exception here would break the interrupted code."""
     while frame is not None:
         module = str(frame.f_globals.get("__name__"))
-        if module.startswith(COMPILED_PACKAGE) or (module, frame.f_code.co_name) in (*COUNTERS, CLUSTER_START):
+        if module.startswith(COMPILED_PACKAGE) or (module, frame.f_code.co_name) in (*COUNTERS, *FLEET_STARTS):
             return True
         if module.partition(".")[0] == SCREEN:
             return frame.f_code.co_name != "input"  # here it waits for a person

@@ -7,8 +7,11 @@ import os
 import signal
 import subprocess
 import sys
+import uuid
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
+from threading import Event
 from typing import Any
 from unittest import mock
 
@@ -21,12 +24,13 @@ from calibrations.importing.foreign import write_csv
 from calibrations.model.file import dump_model, read_model
 from drivers.clock import WallClock
 from rig.errors import RigError
-from rig.fleet.cluster import FleetError, connect_workers, run_tasks
+from rig.fleet.cluster import FleetError, connect_workers, run_tasks, start_client
 from rig.fleet.discover import discover_fleet
 from rig.fleet.members import Member, fleet_of
 from rig.fleet.questions import Fleet
 from rig.fleet.worker import Question, read_look, write_look
 from rig.record import Record
+from rig.runs.signals import stoppable
 from tests.calibrations.fleets import Flaw, Rig, sensor
 
 Command = Callable[..., Any]
@@ -169,6 +173,22 @@ def test_a_signal_ends_a_fleet_with_one_message(number: signal.Signals, started:
     assert "sensors of" in first
     assert [line for line in said.splitlines() if not line.startswith("searching")] == ["rig: stopped"]
     assert command.returncode == 4
+
+
+def test_a_signal_while_the_client_makes_its_name_is_not_lost(
+    cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The standard library discards every exception where a name is made from the address of the network."""
+    make_name = uuid.uuid1
+
+    def interrupted_name(*arguments: Any, **options: Any) -> uuid.UUID:
+        with suppress(BaseException):
+            signal.raise_signal(signal.SIGINT)
+        return make_name(*arguments, **options)
+
+    monkeypatch.setattr(uuid, "uuid1", interrupted_name)
+    with pytest.raises(KeyboardInterrupt, match="SIGINT"), stoppable(), start_client(cluster):
+        Event().wait(30)  # the signal ends it
 
 
 def test_no_scheduler_is_one_message(rig: Command, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
