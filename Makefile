@@ -9,7 +9,7 @@ BIN := .venv/bin
 # Compiled modules are kept: each process of the tests would compile all of them anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-all test-release setup bench docs lint audit clean
+.PHONY: demo test test-all test-release setup tools bench docs lint audit clean
 
 demo: .venv/program
 	$(BIN)/rig demo --folder out/demo --force
@@ -44,16 +44,24 @@ audit: setup
 
 setup: .venv/ready
 
+# What tests run besides Python; only root may install it.
+tools:
+	missing=$$(for tool in mbpoll gcc clang chromium; do command -v $$tool >/dev/null || echo $$tool; done); \
+	if [ -n "$$missing" ] && [ "$$(id -u)" = 0 ]; then \
+		apt-get -qq update; for tool in $$missing; do apt-get -qq install -y $$tool || true; done; \
+	fi
+
 # Each stamp is newer than what it was made from, so that a second call starts at once. The demo needs the program alone,
-# and compiles those kernels that it uses. Mypy reads the types of the dependencies once, for a minute, beside the compiler.
+# and compiles those kernels that it uses. Packages and tools are installed at the same time; mypy reads the types of the
+# dependencies once, for a minute, beside the compiler.
 .venv/program: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
 	touch $@
 
 .venv/ready: .venv/program
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test,fleet,docs]'
-	for tool in mbpoll gcc clang chromium; do [ "$$(id -u)" != 0 ] || command -v $$tool >/dev/null || { apt-get -qq update && apt-get -qq install -y $$tool || true; }; done
+	{ $(MAKE) -s tools || true; } & \
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test,fleet,docs]' && wait
 	command -v chromium >/dev/null || $(BIN)/python -m playwright install chromium || true
 	{ $(BIN)/mypy >/dev/null || true; } & $(BIN)/python -m rig.warm && wait
 	touch $@
