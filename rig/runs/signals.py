@@ -26,6 +26,7 @@ COUNTERS = (("drivers.clock", "step"), ("drivers.transport.link", "put"), ("driv
 # Their code discards an exception, or could not be closed after one.
 FLEET_STARTS = (("rig.fleet.cluster", "start_cluster"), ("rig.fleet.cluster", "start_client"))
 SCREEN = "rich"  # an exception while its console writes would block the console
+QUESTIONS = (("rich.console", "input"), ("rig.cli.terminal.guide", "get_input"))  # these wait for a person
 AGAIN_S = 0.001
 Handler = Callable[[int, FrameType | None], object]
 
@@ -124,10 +125,13 @@ def _indivisible(frame: FrameType | None) -> bool:
     """Whether an exception here would break the interrupted code."""
     while frame is not None:
         module = str(frame.f_globals.get("__name__"))
-        if module.startswith(COMPILED_PACKAGE) or (module, frame.f_code.co_name) in (*COUNTERS, *FLEET_STARTS):
+        function = (module, frame.f_code.co_name)
+        if function in QUESTIONS:
+            return False
+        if function in (*COUNTERS, *FLEET_STARTS):
             return True
-        if module.partition(".")[0] == SCREEN:
-            return frame.f_code.co_name != "input"  # here it waits for a person
+        if module.startswith(COMPILED_PACKAGE) or module.partition(".")[0] == SCREEN:
+            return True
         frame = frame.f_back
     return False
 

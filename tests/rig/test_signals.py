@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from drivers.transport.link import OpenConnection
-from rig.runs.signals import SIGNALS, stoppable
+from rig.runs.signals import QUESTIONS, SIGNALS, stoppable
 
 
 def twice(number: signal.Signals) -> None:
@@ -141,9 +141,7 @@ def test_a_computing_world_and_a_screen_half_written_are_not_interrupted(module:
     assert signalled_in(module, name) == ["whole"]
 
 
-@pytest.mark.parametrize(
-    ("module", "name"), [("rich.console", "input"), ("richer", "print"), ("rig.runs.runner", "run")]
-)
+@pytest.mark.parametrize(("module", "name"), [*QUESTIONS, ("richer", "print"), ("rig.runs.runner", "run")])
 def test_every_wait_for_a_person_can_be_stopped(module: str, name: str) -> None:
     assert signalled_in(module, name) == []
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import select
+import sys
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from types import TracebackType
-from typing import Self, cast
+from typing import Self, TextIO, cast
 
 from rich.console import Console, RenderableType
 from rich.live import Live
 from rich.prompt import Prompt
-from rich.text import Text
+from rich.text import Text, TextType
 
 from procedures.catalogue import Procedure
 from procedures.errors import BadAnswer, Declined, NoAnswer
@@ -30,6 +32,24 @@ from rig.runs.runner import Decision, Outcome
 
 BEGIN = Choice("begin", "Begin?", choices=("go", "cancel"))
 FRAMES_HZ = 8
+LINE_WAIT_S = 0.1
+
+
+class LinePrompt(Prompt):
+    """A question that reads the terminal when a line is there, so that a signal ends it at any moment.
+
+    A signal just before a read that blocks would be noticed only after the next line.
+    """
+
+    @classmethod
+    def get_input(cls, console: Console, prompt: TextType, password: bool, stream: TextIO | None = None) -> str:
+        """The next line, after the prompt."""
+        if not sys.stdin.isatty():  # a pipe's lines may be in a buffer of Python, which `select` does not see
+            return super().get_input(console, prompt, password, stream)
+        console.print(prompt, end="")
+        while not select.select([sys.stdin], [], [], LINE_WAIT_S)[0]:
+            pass
+        return super().get_input(console, "", password, stream)
 
 
 class Guide(RunViewer):
@@ -118,7 +138,7 @@ class Guide(RunViewer):
         text = f"{question.text} ({question.accepts})"
         while True:
             try:
-                typed = Prompt.ask(Text(text), console=self._console, default=instead or "")
+                typed = LinePrompt.ask(Text(text), console=self._console, default=instead or "")
             except EOFError:
                 raise NoAnswer(f'the terminal was closed at the question "{question.text}"; resume the run') from None
             try:
