@@ -172,7 +172,7 @@ def test_a_place_that_is_left_out_is_not_found() -> None:
     assert "cross-response" not in [place.name for place in found.findings.places]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_an_unknown_cause_of_a_motion_has_its_place() -> None:
     def bend(s: Signals, size: float) -> Array:
         return np.asarray(size * np.tanh((s.temperature - 23.5) / 0.3)[:, None] * [1.0, 0.7])

@@ -207,7 +207,7 @@ def test_every_command_gives_the_same_verdict(spoil: Callable[[Data], Data]) -> 
         figures(fit(model, table), None, {}, trials=10)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_scatter_beyond_the_samples_is_unexplained_everywhere() -> None:
     d = healthy()
     wild = 0.02 * np.random.default_rng(9).standard_normal((2, len(d.vx)))

@@ -10,6 +10,7 @@ from calibrations.fitting.fit import Fit
 from calibrations.loop import discover
 from calibrations.model.file import read_model
 from tests.benchmark.shaking import MECHANISMS, OUTSIDE, measured, size_for
+from tests.slow import before_release, slow
 
 
 def discovered(**floors: float) -> Discovery[Fit]:
@@ -19,8 +20,7 @@ def discovered(**floors: float) -> Discovery[Fit]:
     return discover(measured(acting, "two lines", 0), read_model("linear"))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["z-axis-bias", "cross-axis-bias", "temperature-scale"])
+@pytest.mark.parametrize("name", [*slow(["z-axis-bias"]), *before_release(["cross-axis-bias", "temperature-scale"])])
 def test_what_the_formula_of_a_mechanism_leaves_in_motion_has_no_name(name: str) -> None:
     found = discovered(**{name: 10.0})
     assert found.causes == (name,)
@@ -29,7 +29,7 @@ def test_what_the_formula_of_a_mechanism_leaves_in_motion_has_no_name(name: str)
     assert set(found.alternatives) <= {name}
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_what_a_temperature_leaves_over_the_time_has_no_name() -> None:
     assert discovered(temperature_bias=30.0).causes == ("temperature-bias",)
 
@@ -53,8 +53,9 @@ def test_a_clean_record_gets_no_name() -> None:
     assert discover(measured((), "two lines", 1), read_model("linear")).causes == ()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("second", ["sampling-delay", "temperature-bias", "axis-misalignment"])
+@pytest.mark.parametrize(
+    "second", [*slow(["sampling-delay", "axis-misalignment"]), *before_release(["temperature-bias"])]
+)
 def test_a_second_cause_keeps_its_name(second: str) -> None:
     found = discovered(**{"quadratic-nonlinearity": 10.0, second: 8.0})
     named = {"quadratic-nonlinearity", second}
@@ -63,8 +64,7 @@ def test_a_second_cause_keeps_its_name(second: str) -> None:
     assert len(found.causes) == 2
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["slew", "clocks part"])
+@pytest.mark.parametrize("name", [*slow(["clocks part"]), *before_release(["slew"])])
 def test_effects_that_predict_unseen_stretches_badly_explain_nothing(name: str) -> None:
     mechanism = OUTSIDE[name]
     data = measured(((mechanism, size_for(mechanism, 3.0, "three lines", 1)),), "three lines", 1)

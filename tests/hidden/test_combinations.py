@@ -11,7 +11,7 @@ def test_few_rows_without_a_second_axis_end_in_an_answer() -> None:
     assert found.outcome != "error", found.error
 
 
-@pytest.mark.parametrize("seed", [*slow([0, 8, 39]), *before_release([4, 5, 10, 18])])
+@pytest.mark.parametrize("seed", [*slow([0, 8]), *before_release([4, 5, 10, 18, 39])])
 def test_a_combination_ends_in_an_answer_or_a_refusal(seed: int) -> None:
     found = ended(seed)
     assert found.outcome != "error", found.error

@@ -147,7 +147,7 @@ def test_a_clumsy_hand_is_not_worse() -> None:
     assert turns_by_procedure(4, clumsy).worst < 3e-3
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_ten_hands_reach_what_was_asked() -> None:
     found = [turns_by_procedure(seed) for seed in range(1, 11)]
     assert max(errors.worst for errors in found) < 4e-3

@@ -67,7 +67,7 @@ TABLES: Mapping[str, Callable[[], Table]] = {
     "poses": _poses,
     "clean poses": _clean_poses,
     "unexplained poses": lambda: _unexplained_poses(50.0),
-    "unexplained poses, by places": lambda: _unexplained_poses(20.0),
+    "unexplained poses, by places": lambda: _unexplained_poses(24.0),
     "positions": _positions,
     "positions without stated noise": lambda: test_common_floor.accelerometer(3),
     "fields": test_common_floor.magnetometer,
