@@ -7,11 +7,12 @@ import ctypes
 import os
 import sys
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from contextvars import copy_context
 from dataclasses import dataclass
 from functools import partial
 from threading import Event, Thread
+from types import FrameType
 from typing import Any, Generic, ParamSpec, TypeVar
 from weakref import WeakSet
 
@@ -23,6 +24,9 @@ from rig.services.search import Cancelled, CountedEffects
 
 P = ParamSpec("P")
 R = TypeVar("R")
+
+INDIVISIBLE = ("numba", "llvmlite", "importlib")  # the compiler and the import of modules
+LATER_S = 0.01
 
 
 class Visit:
@@ -89,10 +93,34 @@ class Calculation(Generic[R]):
     is_cancelled: Event
 
     def cancel(self) -> None:
-        """Raise Cancelled in the thread at its next line of Python."""
-        if not self.future.done() and (number := self.thread.ident) is not None:
+        """Raise Cancelled in the thread at its next line of Python, after the compilation or import in which it is."""
+        if not self.future.done():
             self.is_cancelled.set()
-            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(number), ctypes.py_object(Cancelled))
+        if not self._interrupt():
+            Thread(target=self._interrupt_later, name="cancellation", daemon=True).start()
+
+    def _interrupt(self) -> bool:
+        """Raise Cancelled in the thread; False if it is where an exception would break the code of others."""
+        number = self.thread.ident
+        if self.future.done() or number is None:
+            return True
+        if _is_indivisible(sys._current_frames().get(number)):
+            return False
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(number), ctypes.py_object(Cancelled))
+        return True
+
+    def _interrupt_later(self) -> None:
+        while not self._interrupt():
+            wait([self.future], LATER_S)
+
+
+def _is_indivisible(frame: FrameType | None) -> bool:
+    """Whether an exception would leave a lock locked for ever, or be discarded."""
+    while frame is not None:
+        if str(frame.f_globals.get("__name__")).partition(".")[0] in INDIVISIBLE:
+            return True
+        frame = frame.f_back
+    return False
 
 
 def begin(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> Calculation[R]:

@@ -9,7 +9,7 @@ import threading
 from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, closing
 from pathlib import Path
-from types import SimpleNamespace
+from types import FunctionType, SimpleNamespace
 from typing import cast
 from urllib.parse import quote
 
@@ -199,6 +199,36 @@ def test_a_cancelled_calculation_ends_at_its_next_line() -> None:
     calculation.thread.join(60)
     assert not calculation.thread.is_alive()
     calculation.cancel()  # after the end: nothing happens
+
+
+@pytest.mark.parametrize(
+    "module", ["numba.core.compiler_lock", "llvmlite.binding.executionengine", "importlib._bootstrap"]
+)
+def test_a_cancellation_waits_for_the_end_of_a_compilation_or_an_import(module: str) -> None:
+    """An exception there leaves a lock that nobody opens, and every later calculation would wait."""
+    entered, cancelled, left = threading.Event(), threading.Event(), threading.Event()
+
+    def compile_function() -> None:
+        entered.set()
+        for _ in range(1000):
+            cancelled.wait(10)
+        left.set()
+
+    namespace = {"__name__": module, "__builtins__": __builtins__}
+    guarded = FunctionType(compile_function.__code__, namespace, closure=compile_function.__closure__)
+
+    def work() -> None:
+        guarded()
+        while True:
+            pass
+
+    calculation = begin(work)
+    assert entered.wait(10)
+    calculation.cancel()
+    cancelled.set()
+    with pytest.raises(Cancelled):
+        calculation.future.result(10)
+    assert left.is_set()
 
 
 def test_what_a_cancellation_becomes_in_compiled_code_is_no_fault() -> None:
