@@ -22,5 +22,5 @@ def check_standard(rig: Session, *, dwell_s: float = 5.0, settle_s: float = 0.5)
     if dwell_s <= 0 or settle_s < 0:
         raise SettingError(f"check-standard: dwell_s is {dwell_s:g} and settle_s is {settle_s:g}; give times above 0")
     prepare(rig, "Is the check standard mounted face up on the table? Can its cable move freely?")
-    for pose in rig.missing(tumble("check 1")):
+    for pose in rig.missing(tumble("tumble 1")):
         rig.hold(pose, dwell_s, settle_s)

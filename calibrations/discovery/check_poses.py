@@ -65,7 +65,7 @@ def judge_check_poses(model: Model, table: Table) -> Check | None:
     None if they are too few, if the other poses do not determine the model, or if the noise is not known.
     """
     marked = np.array([path.startswith(MARK) for path in table.labels.get("path", ())], dtype=bool)
-    if not table.type.stage_angles or marked.sum() < FEWEST_CHECKS:
+    if not table.type.stage_angles or marked.sum() < FEWEST_CHECKS or marked.all():
         return None
     try:
         fitted = fit(model, table.rows(~marked))

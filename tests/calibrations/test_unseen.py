@@ -53,8 +53,8 @@ def test_repeated_check_poses_are_counted() -> None:
     assert check.repeats == 72 - 36 - 6  # 36 poses, each twice, but for the six check poses
 
 
-@pytest.mark.parametrize("checks", [0, 2])
-def test_too_few_poses_are_no_check(checks: int) -> None:
+@pytest.mark.parametrize("checks", [0, 2, 72])
+def test_too_few_or_all_poses_are_no_check(checks: int) -> None:
     assert judge_check_poses(LINEAR, measured(4, checks=checks)) is None
 
 

@@ -43,6 +43,8 @@ def test_a_check_standard_is_measured_and_begins_its_baseline(rig: Rig) -> None:
     charted = rig("control", "simulated")
     assert charted.status == 0
     assert charted.out.count("2 of 20") == 4
+    fitted = rig("fit", "last", "--model", "linear")
+    assert (fitted.status, "check poses" in fitted.out) == (0, False), fitted.err
     assert charted.out.endswith("\nbaseline\n")
 
 
