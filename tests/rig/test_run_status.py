@@ -10,7 +10,7 @@ import pytest
 from procedures.catalogue import find
 from procedures.settings import parse
 from rig.bench import read_bench
-from rig.bench.file import DEMO
+from rig.bench.file import DEMO, HAND
 from rig.cli.terminal.watch import Quiet
 from rig.files import home
 from rig.lease import lease
@@ -19,7 +19,7 @@ from rig.runs.background import control
 from rig.runs.background import status as status_file
 from rig.runs.background.status import KEPT_ESTIMATES, Order, Status, file, folder, keys, lock, read, remove_old_files
 from rig.runs.runner import start
-from rig.web.pages.run_live import stop_words
+from rig.web.pages.run_live import count_words, stop_words
 from tests.rig.rigging import POSES, SMALL
 
 KEY = "20261121-093012"
@@ -106,6 +106,29 @@ def test_the_last_status_counts_the_poses_of_the_record() -> None:
     assert (last.phase, last.done, last.state, last.error) == ("ended", 8, "stopped", "stopped")
 
 
+def test_a_run_that_reaches_its_target_early_is_whole() -> None:
+    folder().mkdir(parents=True)
+    writer = status_file.StatusWriter(KEY, "hand-turns", read_bench(HAND))
+    with Record() as record:
+        name = record.begin(
+            "hand-turns",
+            {},
+            bench={"name": "a bench"},
+            identities={},
+            configuration="",
+            source="a test",
+            constants={},
+            kind="turns",
+        )
+        writer.begun(name)
+        writer.expect(79, 23)
+        writer.ended(replace(record.run(name), rows=23, state="complete"), "")
+    last = read(KEY)
+    assert last is not None
+    assert (last.done, last.total) == (23, 23)
+    assert count_words(last) == "23 turns and rests"
+
+
 def test_the_status_of_a_killed_process_is_that_of_its_record() -> None:
     """A process can be killed after a pose is stored and before it is published."""
     folder().mkdir(parents=True)
@@ -123,4 +146,5 @@ def test_the_status_of_a_killed_process_is_that_of_its_record() -> None:
     assert (stopped.phase, stopped.state, stopped.done) == ("ended", "stopped", 3)
     assert "it was killed" in stopped.error
     assert (complete.phase, complete.state, complete.done, complete.error) == ("ended", "complete", POSES, "")
+    assert (complete.total, complete.extent, stopped.extent) == (POSES, f"{POSES} poses", "")
     assert read(f"{KEY}-{part}") == stopped

@@ -130,7 +130,7 @@ class Status:
     `seat`: where a person answers: a page, the terminal of the run, or nobody: then it cannot pause. `error`: why it is
     paused or not complete. `moving`: instruments that did not stop. `guidance`: keywords of
     `procedures.session.Guidance`, of a procedure with the sensor in a hand; it has no `attitude`. `attended`: that of
-    the order.
+    the order. `extent`: the measurements of a complete run, in words.
     """
 
     key: str
@@ -152,6 +152,7 @@ class Status:
     seat: Seat = "page"
     guidance: Mapping[str, Any] = field(default_factory=dict)
     attended: bool = False
+    extent: str = ""
 
     def write(self) -> None:
         """Write the status into its file."""
@@ -191,15 +192,20 @@ def _status_of_killed(status: Status) -> Status:
         with Record.to_find(status.run, local_only=True) as record:
             run = record.run(status.run)
         if run.state == "complete":
-            status = replace(status, state=run.state, error="")
-        status = replace(status, done=_count_stored(run, status.done, status.total))
+            status = replace(status, state=run.state, error="", extent=run.extent)
+        done, total = _count_stored(run, status.done, status.total)
+        status = replace(status, done=done, total=total)
         status.write()  # later readers need not look into the record
     return status
 
 
-def _count_stored(run: Run, seen_poses: int, total: int) -> int:
-    """The poses of a run that has ended. A signal can come before a stored one is counted."""
-    return max(run.rows, seen_poses) if total else 0
+def _count_stored(run: Run, seen_poses: int, total: int) -> tuple[int, int]:
+    """The poses of a run that has ended, and how many it wanted. A signal can come before a stored one is counted.
+
+    A run that is complete before its planned end, because its target is reached, wants no more.
+    """
+    stored = max(run.rows, seen_poses) if total else 0
+    return stored, stored if run.state == "complete" else total
 
 
 def _is_starting(status: Status) -> bool:
@@ -284,9 +290,10 @@ class StatusWriter(RunViewer):
 
     def ended(self, run: Run, error: str, **changes: Any) -> None:
         """Write the last status, with the poses of the record."""
-        recorded_poses = _count_stored(run, self.view.progress.done, self.view.progress.total)
-        self.view = replace(self.view, progress=replace(self.view.progress, done=recorded_poses))
-        self.publish(phase="ended", state=run.state, asked=None, error=error, **changes)
+        done, total = _count_stored(run, self.view.progress.done, self.view.progress.total)
+        self.view = replace(self.view, progress=replace(self.view.progress, done=done, total=total))
+        extent = run.extent if run.state == "complete" else ""
+        self.publish(phase="ended", state=run.state, asked=None, error=error, extent=extent, **changes)
 
     def stop_source(self, signal_name: str) -> str:
         return stop_source_of(self._status.key, signal_name)

@@ -165,8 +165,7 @@ class Live:
         self.share.set_text(f"{100 * status.done // status.total} %" if status.total else "")
         self.bar.set_value(status.done / status.total if status.total else 0.0)
         self.bar.set_visibility(active or bool(status.total))
-        poses = f"{status.done} of {status.total} poses" if status.total else ""
-        self.count.set_text("; ".join(filter(None, (poses, status.left if active else ""))))
+        self.count.set_text(count_words(status))
         self._links(status)
         paused = status.phase == "paused" and status.seat == "page"
         self.pause.set_visibility(status.phase == "running" and status.seat != "nobody")
@@ -286,6 +285,12 @@ def _tile(value: Mapping[str, Any]) -> None:
             div("").style(f"left: {percent:.1f}%")
         words(for_page(f"{low:g} to {high:g} {value['shown'].rpartition(' ')[2]}"), "small quiet number")
         words(value["near"] or for_page(value["remark"]), "small")
+
+
+def count_words(status: Status) -> str:
+    """How many poses there are, and how long the rest takes; of a complete run its measurements."""
+    poses = f"{status.done} of {status.total} poses" if status.total else ""
+    return "; ".join(filter(None, (status.extent or poses, status.left if status.phase != "ended" else "")))
 
 
 def stop_words(status: Status) -> str:
