@@ -34,6 +34,7 @@ UNITS = {
     "um": "um",
     "percent": "%",
     "c": "°C",
+    "g": "g",
     "s": "s",
 }  # ends of names
 
