@@ -2,6 +2,7 @@
 
     DriverError
     ├── LimitError         a value outside its limits was refused; nothing was sent
+    │   └── NotWired       an output that no input of the converter is wired to
     ├── LinkError          the wire
     │   ├── LinkRefused    it cannot be opened, or the other side closed it
     │   ├── LinkTimeout    silence
@@ -39,6 +40,10 @@ class DriverError(Exception):
 
 class LimitError(DriverError):
     """A value outside its limits; nothing was sent."""
+
+
+class NotWired(LimitError):
+    """An output that no input of the converter is wired to."""
 
 
 class LinkError(DriverError):

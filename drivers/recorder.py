@@ -11,7 +11,7 @@ from typing import Generic, Protocol, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.errors import LimitError
+from drivers.errors import LimitError, NotWired
 
 Read = TypeVar("Read")
 Input = TypeVar("Input", int, str)  # a number, or the name of a record
@@ -58,12 +58,12 @@ class Inputs(Generic[Input]):
     def only(self, name: str, outputs: Sequence[str]) -> Self:
         """Settings of a converter `name` whose channels are these; of a batch `a1.mx`, `a2.mx` are both `mx`.
 
-        Raises LimitError for an output that no input is wired to.
+        Raises NotWired for an output that no input is wired to.
         """
         if missing := [
             name_asked for name_asked in outputs if name_asked not in {key.rpartition(".")[2] for key in self.wired}
         ]:
-            raise LimitError(
+            raise NotWired(
                 f"{name}: no input is wired to {', '.join(missing)}; there are {', '.join(self.wired)}",
                 "Name the inputs in the bench file, under channels or on_request of the converter's settings",
             )

@@ -2,6 +2,7 @@
 
 ProcedureError
 ├── UnknownProcedure    no procedure has this name; the message has a suggestion
+├── NoInstrument        the bench has no instrument in a role that the procedure needs
 ├── SettingError        an unknown setting, or a value with the wrong type or out of range
 ├── BadAnswer           the question does not accept this answer
 ├── NoAnswer            nobody is there to answer a question; the run stops and can be resumed
@@ -18,6 +19,10 @@ class ProcedureError(Exception):
 
 class UnknownProcedure(ProcedureError):
     """No procedure of this name."""
+
+
+class NoInstrument(ProcedureError):
+    """The bench has no instrument in this role."""
 
 
 class SettingError(ProcedureError):

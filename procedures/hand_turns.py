@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 
-from drivers.errors import LimitError
+from drivers.errors import NotWired
 from drivers.recorder import Samples, join_samples
 from procedures.at_rest import (
     FEWEST,
@@ -73,12 +73,12 @@ def hand_turns(
 
 
 def _only_both_triads(rig: Session) -> Adc:
-    """The converter with the outputs of both sensors. Raises LimitError, with what to do without an accelerometer."""
+    """The converter with the outputs of both sensors. Raises NotWired, with what to do without an accelerometer."""
     try:
         return rig.adc.only(*FORCES, *RATES)
-    except LimitError as error:
+    except NotWired as error:
         remedies = [error.remedy, *([WITHOUT_ACCELEROMETER] if "ax" in error.what.partition(";")[0] else [])]
-        raise LimitError(error.what, ". ".join(remedies)) from None
+        raise NotWired(error.what, ". ".join(remedies)) from None
 
 
 @dataclass

@@ -19,7 +19,7 @@ from drivers.transport.link import Tap
 from drivers.transport.person import PersonLink
 from drivers.transport.server import Server
 from drivers.world.batch import AnyWorld
-from procedures.errors import ProcedureError
+from procedures.errors import NoInstrument
 from procedures.instruments import Oven, Stage
 from procedures.questions import Dial
 from procedures.session import Dwell, Host, Session
@@ -50,7 +50,7 @@ MOVING = ("alpha", "beta", "positioner")
 
 
 class Absent:
-    """The place of an instrument that is not in the bench file. Every use raises ProcedureError."""
+    """The place of an instrument that is not in the bench file. Every use raises NoInstrument."""
 
     def __init__(self, role: str) -> None:
         self._role = role
@@ -60,11 +60,11 @@ class Absent:
         return True
 
     def __getattr__(self, name: str) -> Any:
-        raise ProcedureError(f"the bench has no {self._role}, but this procedure needs it; add it to the bench file")
+        raise NoInstrument(f"the bench has no {self._role}, but this procedure needs it; add it to the bench file")
 
 
 class NoOven(Absent):
-    """A bench without oven and thermometer: the temperature is unknown. Every other use raises ProcedureError."""
+    """A bench without oven and thermometer: the temperature is unknown. Every other use raises NoInstrument."""
 
     def temperature_c(self) -> None:
         return None

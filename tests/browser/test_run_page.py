@@ -286,9 +286,13 @@ def test_a_run_without_poses_is_made_by_keyboard_and_leads_to_its_results(workbe
 
 
 def test_a_bench_is_chosen_before_a_run_and_stays_during_it(workbench: Workbench) -> None:
-    page = workbench.visit("/run")
+    page = workbench.visit("/run?procedure=hand-positions&target_g=0.002")
+    expect(page.get_by_text("adc: no input is wired to ax, ay, az")).to_be_visible()
+    expect(page.get_by_text("Another bench of the list Measure on may have it.")).to_be_visible()
     bench(page, "demonstration rig")
     expect(page.get_by_text("positioner")).to_have_count(0)  # the demonstration rig has none
+    expect(page.get_by_label("Procedure")).to_have_value(re.compile("^hand-positions"))
+    expect(page.get_by_label("target (g)")).to_have_value("0.002")
     other = workbench.visit("/run?procedure=soak&duration_s=43200")
     expect(other.get_by_label("Measure on")).to_have_value(re.compile("demonstration rig"))
     expect(other.get_by_text("Takes", exact=True)).to_be_visible()
@@ -302,6 +306,16 @@ def test_a_bench_is_chosen_before_a_run_and_stays_during_it(workbench: Workbench
     expect(page.get_by_label("Measure on")).to_have_value("simulated rig")
     page.keyboard.press("F8")
     phase(page, "stopped")
+
+
+def test_an_unknown_procedure_is_not_replaced_by_another(workbench: Workbench) -> None:
+    page = workbench.visit("/run?procedure=nonsense")
+    expect(page.get_by_text("There is no procedure 'nonsense' on this bench")).to_be_visible()
+    expect(page.get_by_role("button", name="Start")).to_be_disabled()
+    page.get_by_label("Procedure").click()
+    page.get_by_role("option", name="level-check").click()
+    expect(page.get_by_text("Takes", exact=True)).to_be_visible()
+    expect(page.get_by_role("button", name="Start")).to_be_enabled()
 
 
 def bench(page: Page, name: str) -> None:

@@ -13,8 +13,9 @@ from fastapi import Request
 from nicegui import ui
 
 from calibrations.text import duration
+from drivers.errors import NotWired
 from procedures.catalogue import Procedure, find, paths, summary
-from procedures.errors import SettingError
+from procedures.errors import NoInstrument, SettingError
 from procedures.settings import choices, meaning, parse, setting_label, setting_text
 from rig.bench import Bench, read_bench
 from rig.bench.certificates import find_expired
@@ -35,6 +36,7 @@ from rig.web.parts import box, button, div, facts, message, show_error, shown, t
 
 MOST_STRETCHES = 12
 DEFAULT_PROCEDURE = "sweep"
+OTHER_BENCH = "Another bench of the list Measure on may have it."
 
 
 def register(desk: Desk) -> None:
@@ -49,12 +51,12 @@ def register(desk: Desk) -> None:
             except Exception as error:
                 show_error("The bench file cannot be used", error)
                 if len(desk.benches) > 1:
-                    BenchChoice(desk)
+                    BenchChoice(desk, lambda: f"/run?{request.query_params}")
                 return
             with div("run-page"):
                 with div("stack"):
-                    planning = PlanForm(bench_file, bench, dict(request.query_params))
-                    Instruments(desk, bench)
+                    planning = PlanForm(bench_file, bench, dict(request.query_params), len(desk.benches) > 1)
+                    Instruments(desk, bench, lambda: planning.address)
                 with div("stack"):
                     live = Live(planning.allow)
                     planning.lay_out_plan()
@@ -63,10 +65,13 @@ def register(desk: Desk) -> None:
 
 
 class BenchChoice:
-    """The choice of the bench for all pages, among those that `rig web` was started with."""
+    """The choice of the bench for all pages, among those that `rig web` was started with.
 
-    def __init__(self, desk: Desk) -> None:
-        self.desk = desk
+    `address` gives the page Run with the present procedure and settings, which the other bench may have as well.
+    """
+
+    def __init__(self, desk: Desk, address: Callable[[], str]) -> None:
+        self.desk, self.address = desk, address
         names = {k: _bench_name(path) for k, path in enumerate(desk.benches)}
         self.choice = ui.select(names, label="Measure on", value=self._present, on_change=self.choose)
         self.choice.props("dense options-dense").style("width: 100%")
@@ -85,7 +90,7 @@ class BenchChoice:
             ui.notify(message(error), type="warning")
             self.choice.set_value(self._present)
             return
-        ui.navigate.to("/run")
+        ui.navigate.to(self.address())
 
 
 def _bench_name(path: Path | None) -> str:
@@ -100,12 +105,12 @@ def _bench_name(path: Path | None) -> str:
 class Instruments:
     """The instruments of the bench, and a button that checks them."""
 
-    def __init__(self, desk: Desk, bench: Bench) -> None:
+    def __init__(self, desk: Desk, bench: Bench, address: Callable[[], str]) -> None:
         self.bench = bench
         with box("stack bench"):
             words("Bench", "title")
             if len(desk.benches) > 1:
-                BenchChoice(desk)
+                BenchChoice(desk, address)
             else:
                 words(bench.name, "quiet small")
             for fault in find_expired(bench, datetime.now(UTC).date()):
@@ -139,20 +144,26 @@ def _url_text(url: str) -> str:
 
 
 class PlanForm:
-    """The form of a procedure and its settings; every change makes a new plan."""
+    """The form of a procedure and its settings; every change makes a new plan.
 
-    def __init__(self, bench_file: Path | None, bench: Bench, settings: Mapping[str, str]) -> None:
-        self.bench_file, self.bench = bench_file, bench
+    `settings`: those of the address, with the procedure. `can_change_bench`: the page offers other benches.
+    """
+
+    def __init__(
+        self, bench_file: Path | None, bench: Bench, settings: Mapping[str, str], can_change_bench: bool = False
+    ) -> None:
+        self.bench_file, self.bench, self.can_change_bench = bench_file, bench, can_change_bench
         self.given = {name: value for name, value in settings.items() if name != "procedure"}
         self.started: Callable[[], Awaitable[None]] | None = None
-        self.turn, self.address, self.visit = 0, "", Visit()
+        self.turn, self.address, self.visit = 0, f"/run?{urlencode(settings)}", Visit()
+        self.inputs: dict[str, Any] = {}
         self.planned: Plan | None = None
         self.under_way = False  # a run is in progress
         names = {name: f"{name}: {summary(path)}" for name, path in paths(bench.folders.procedures).items()}
-        selected = settings.get("procedure", DEFAULT_PROCEDURE)
+        self.asked = settings.get("procedure", DEFAULT_PROCEDURE).replace("_", "-")
         with box():
             words("Measure", "title")
-            self.name = ui.select(names, label="Procedure", value=selected if selected in names else DEFAULT_PROCEDURE)
+            self.name = ui.select(names, label="Procedure", value=self.asked if self.asked in names else None)
             self.name.props("dense options-dense").on_value_change(self._show_settings).style("width: 100%")
             self.about = words("", "quiet small")
             self.fields = div("settings")
@@ -172,7 +183,14 @@ class PlanForm:
         with box():
             words("Plan", "title")
             self.plan = div("stack")
-        self._show_settings()
+        if self.name.value is not None:
+            self._show_settings()
+            return
+        self.meant.set_visibility(False)
+        self.optimal.set_visibility(False)
+        with self.plan:
+            unknown = f"There is no procedure {self.asked!r} on this bench; choose one of the list Procedure."
+            show_error("This procedure is not known", unknown)
 
     @property
     def procedure(self) -> Procedure:
@@ -190,7 +208,7 @@ class PlanForm:
         self.optimal.set_visibility(procedure.name == "sweep")
         self.fields.clear()
         choices_by_name = choices(procedure)
-        self.inputs: dict[str, Any] = {}
+        self.inputs = {}
         with self.fields:
             for name, default in procedure.defaults.items():
                 field = _field(name, self.given.get(name, setting_text(default)), choices_by_name.get(name, ()))
@@ -251,6 +269,10 @@ class PlanForm:
             planned = plan(self.bench, procedure, parse(procedure, settings))
         except SettingError as error:
             raise SettingError(with_labels(str(error), procedure.defaults)) from error
+        except (NoInstrument, NotWired) as error:
+            if not self.can_change_bench:
+                raise
+            raise NoInstrument(f"{error}{'' if str(error).endswith('.') else '.'}\n{OTHER_BENCH}") from error
         if planned.reach:
             strip(mounting(planned))  # drawn and kept before a person clicks on Start
         return planned
