@@ -15,6 +15,8 @@ from rig.record.values import Event, Line
 STOPS = (Stopped, SafetyLimit, Interlocked, NoAnswer, Declined)  # errors that stop a run; others are failures
 TURNS = ("begun", "error", "stopped", "complete")  # kinds of lines in the log
 ENDS = ("stopped", "failed")  # events that end a part of a run
+ANSWER = "answer "  # event: an answer of a person; the name of the question follows
+QUESTION = "question"  # kind of the log's lines with the name of a question and its text
 WITHOUT_END = "; before, its process was killed or the disk was full"
 ERROR = re.compile(r"(\w+): (?:stopped )?(.*?)(?:; `rig resume [^`]*` continues the run)?", re.DOTALL)
 

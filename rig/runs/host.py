@@ -14,6 +14,7 @@ from rig.errors import RunMismatch
 from rig.instruments.instruments import Rig
 from rig.instruments.person import answer, follow
 from rig.record import KeptPose, Record, Run
+from rig.record.history import ANSWER, QUESTION
 from rig.record.measured import MeasuredRun, of_sensor
 from rig.runs.observer import Observer
 from rig.runs.stuck import StuckOutputs
@@ -53,7 +54,7 @@ class RunHost:
         self._next = record.next_number(run.run)
         self._measured = MeasuredRun(record, run, rig.bench.first_sensor)
         self._dwells: list[Dwell] | None = None  # read from the record if the procedure needs them
-        self._answers = {e.what: e.text for e in record.events(run.run) if e.what.startswith("answer ")}
+        self._answers = {e.what: e.text for e in record.events(run.run) if e.what.startswith(ANSWER)}
         self._zero_s = state["zero_s"] if state else _zero_s(rig, run)
         self._counted: dict[str, tuple[float, str]] = {}
         self._readings: Sequence[Reading] | None = record.readings(run.run)
@@ -148,13 +149,14 @@ class RunHost:
             self._record.keep_state(self._run, state)
 
     def ask(self, question: Question) -> str:
-        key = f"answer {question.name}"
+        key = f"{ANSWER}{question.name}"
         if key in self._answers and not question.repeated:
             return self._answers[key]
         reply = question.checked(self._observer.ask(question, answer(question, self._rig)))
         if reply != "no":  # a resumed run asks again after a no
             self._answers[key] = reply
             self._record.note(self._run, key, reply)
+        self._log(QUESTION, f"{question.name}: {question.text}")
         self._log("asked", f"{question.name}: {reply}")
         return reply
 

@@ -31,7 +31,7 @@ from rig.lease import lease
 from rig.planning.plan import plan
 from rig.planning.preparation import first_question
 from rig.record import Record, Run
-from rig.record.history import STOPS
+from rig.record.history import ANSWER, STOPS
 from rig.record.values import CHANGED
 from rig.results import Result, documents, judge_results, read_returned
 from rig.runs.host import RunHost, leave_as
@@ -133,7 +133,7 @@ def _resume(
 
 def _find_unanswered_question(record: Record, run: Run, bench: Bench, procedure: Procedure) -> Confirm | None:
     """The first question of a run that ended before its answer; None if the record has an answer."""
-    if any(event.what.startswith("answer ") for event in record.events(run.run)):
+    if any(event.what.startswith(ANSWER) for event in record.events(run.run)):
         return None
     return first_question(plan(bench, procedure, parse(procedure, run.settings)))
 

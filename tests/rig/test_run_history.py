@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from rig.bench import read_bench
-from rig.record import Line, Record
+from rig.record import Event, Line, Record
 from rig.record.history import _turns, history
 from rig.record.measured import INTERRUPTIONS, table_of
 from rig.runs.runner import resume, start
+from rig.services.event_words import events_in_words, in_words
 from tests.rig.rigging import Onlooker, sigterm_at, small_sweep
 
 
@@ -53,6 +54,22 @@ def test_a_stopped_and_resumed_run_says_so_in_its_events_table_and_export(
     ]  # fmt: skip
     rig("export", run.run, "--format", "csv", "--out", tmp_path / "run.csv")
     assert f"# {INTERRUPTIONS}: {told}" in (tmp_path / "run.csv").read_text().splitlines()
+
+
+def test_a_page_has_the_question_of_an_answer_and_no_pose_zero() -> None:
+    with Record() as record:
+        with sigterm_at(4):
+            run = start(record, read_bench(), *small_sweep(), InATerminal()).run
+        resume(record, run.run, Onlooker())
+        events = [(event.what, event.text) for event in events_in_words(record, run.run)]
+    assert events[:2] == [
+        ("begun", "sweep at the first pose, in a terminal"),
+        ("answer", "Is the sensor mounted face up on the table? Can its cable turn freely? yes"),
+    ]
+    assert ("resumed", f"sweep after {run.rows} poses") in events
+    older = Event("", "answer level-front-x", "-0.0")
+    assert in_words(older, {}).text == "level front x: 0"
+    assert in_words(older, {"level-front-x": "What does it show along x, in deg?"}).text.endswith("in deg? 0")
 
 
 def test_an_undisturbed_run_has_no_interruptions() -> None:

@@ -16,9 +16,9 @@ from procedures.settings import setting_label, setting_text
 from rig.bench.result_names import label
 from rig.errors import RecordError
 from rig.record import Event, Record, Run
-from rig.record.history import history
 from rig.record.tables import units_of
 from rig.services.charts import Course, RunTime, course_chart, kind_label, kind_of
+from rig.services.event_words import events_in_words
 from rig.services.exclusion import exclude, find_numbered_run
 from rig.services.export import export
 from rig.services.history import calibration_counts, type_of
@@ -306,10 +306,10 @@ class OneRun:
 
     def _show_events(self) -> None:
         with Record.to_read() as record:
-            events = history(record, self.run.run)
+            events = events_in_words(record, self.run.run)
         with afresh(self.events):
             if events:
-                table(("time (UTC)", "event", ""), [_event(event) for event in events])
+                table(("time (UTC)", "event", "what"), [_event(event) for event in events])
             else:
                 words("No events.", "quiet small")
 
@@ -356,4 +356,4 @@ def _circumstances(run: Run) -> tuple[dict[str, str], ...]:
 
 
 def _event(event: Event) -> tuple[str, str, str]:
-    return event.at[:19].replace("T", " "), event.what, event.text
+    return event.at[:19].replace("T", " "), event.what, for_page(event.text)
