@@ -30,7 +30,11 @@ class SettingError(ProcedureError):
 
 
 class BadAnswer(ProcedureError):
-    """The question does not accept this answer."""
+    """The question does not accept this answer. `beside`: the message for a reader who sees the question."""
+
+    def __init__(self, message: str, beside: str = "") -> None:
+        super().__init__(message)
+        self.beside = beside or message
 
 
 class NoAnswer(ProcedureError):

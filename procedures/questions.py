@@ -35,8 +35,11 @@ class Question:
         """The answer in the form for the record. Raises BadAnswer."""
         return answer.strip()
 
-    def _bad_answer(self, answer: str) -> BadAnswer:
-        return BadAnswer(f"{self.name}: {answer!r} does not answer {self.text!r}; answer with {self.accepts}")
+    def _bad_answer(self, answer: str, hint: str = "") -> BadAnswer:
+        remedy = f"answer with {self.accepts}{hint}"
+        return BadAnswer(
+            f"{self.name}: {answer!r} does not answer {self.text!r}; {remedy}", f"{answer!r} is no answer; {remedy}"
+        )
 
 
 @dataclass(frozen=True)
@@ -151,4 +154,4 @@ class Choice(Question):
         begun = [choice for choice in self.choices if word and choice.startswith(word)]
         if word in self.choices or len(begun) == 1:
             return word if word in self.choices else begun[0]
-        raise BadAnswer(f"{self._bad_answer(answer)}.{did_you_mean(word, (), self.choices)}")
+        raise self._bad_answer(answer, f".{did_you_mean(word, (), self.choices)}")

@@ -72,7 +72,8 @@ def _(question: Number, rig: Rig, world: AnyWorld) -> str | None:  # noqa: ARG00
     if not question.name.startswith("level-"):
         return None
     x_deg, y_deg = world.level_deg()
-    return f"{x_deg if question.name.endswith('-x') else y_deg:.2f}"
+    shown_deg = round(x_deg if question.name.endswith("-x") else y_deg, 2)
+    return f"{shown_deg + 0.0:.2f}"  # not -0.00
 
 
 @_do_work.register

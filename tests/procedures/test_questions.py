@@ -55,6 +55,8 @@ def test_what_makes_no_sense_is_refused(question: Question, said: str, told: str
     with pytest.raises(BadAnswer, match=question.name) as refused:
         question.checked(said)
     assert told in str(refused.value)
+    assert told in refused.value.beside
+    assert question.text not in refused.value.beside
 
 
 @pytest.mark.parametrize(("said", "chosen"), [("front", "front"), ("Back", "back"), ("b", "back")])

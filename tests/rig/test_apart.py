@@ -183,12 +183,13 @@ def test_a_question_is_asked_until_its_answer_makes_sense() -> None:
         assert asking.asked.attitude is not None
         control.answer(asking, "perhaps")
         again = when("asking", lambda s: bool(s.asked and s.asked.refused))
-        refused.append(again.asked.refused if again.asked else "")
+        assert again.asked is not None
+        refused.extend([again.asked.refused, again.asked.typed])
         control.answer(again, "yes")
 
     status = carried_out("sweep", SMALL, person, attended=True)
     assert status.state == "complete"
-    assert "answer with yes or no" in refused[0]
+    assert refused == ["'perhaps' is no answer; answer with yes or no", "perhaps"]
 
 
 def test_what_cannot_be_run_is_told_as_well() -> None:

@@ -67,7 +67,7 @@ class Attendant(StatusWriter):
                 try:
                     checked = question.checked(message["text"]) if message.get("name") == question.name else None
                 except BadAnswer as error:
-                    question_shown = replace(question_shown, refused=str(error))
+                    question_shown = replace(question_shown, refused=error.beside, typed=message["text"])
                     continue
                 if checked is not None:
                     self.publish(phase="running", asked=None)

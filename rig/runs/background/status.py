@@ -111,7 +111,8 @@ Seat = Literal["page", "terminal", "nobody"]
 class OpenQuestion:
     """A question to a person. `proposed`: answer of the simulated technician. `refused`: fault of the last answer.
 
-    `attitude`: the mounting, for a question about it; keywords of `rig.drawings.Attitude`.
+    `typed`: the last answer, to be corrected. `attitude`: the mounting, for a question about it; keywords of
+    `rig.drawings.Attitude`.
     """
 
     name: str
@@ -121,6 +122,7 @@ class OpenQuestion:
     proposed: str = ""
     refused: str = ""
     attitude: Mapping[str, Any] | None = None
+    typed: str = ""
 
 
 @dataclass(frozen=True)

@@ -210,7 +210,7 @@ class Live:
                 with div("attitude"):
                     ui.html(_drawing(question.attitude), sanitize=False)
             if question.refused:
-                words(question.refused, "fault")
+                words(for_page(question.refused), "fault")
             if can_answer:
                 self._answers(question)
             else:
@@ -222,7 +222,9 @@ class Live:
             for choice in question.choices:
                 ui.button(choice, on_click=partial(self.decide, choice))
             if not question.choices:
-                typed = ui.input(question.accepts, value=question.proposed).props("dense autofocus")
+                typed = ui.input(for_page(question.accepts), value=question.typed or question.proposed).props(
+                    "dense autofocus"
+                )
                 typed.on("keydown.enter", lambda: self.decide(str(typed.value)))
                 ui.button("Answer", on_click=lambda: self.decide(str(typed.value)))
 
