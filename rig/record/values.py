@@ -9,9 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from calibrations.text import as_written
+from calibrations.text import as_written, count_words
 from drivers.recorder import Samples
 from procedures.session import Dwell, Pose
+
+TURNS = ("turn or rest", "turns and rests")
+UNITS = {  # what the rows of a run are, by its kind
+    "poses": ("pose", "poses"),
+    "positions": ("position", "positions"),
+    "rates": TURNS,
+    "turns": TURNS,
+}
 
 
 @dataclass(frozen=True)
@@ -70,15 +78,11 @@ class Run:
     def extent(self) -> str:
         """The number of poses, rows or turns, as text. A record without gaps consists of many blocks."""
         if not self.bench:
-            return f"{self.rows} rows"
+            return count_words(self.rows, "row", "rows")
         if not self.rows:
             return "no poses"
-        return {
-            "poses": f"{self.rows} poses",
-            "positions": f"{self.rows} positions",
-            "rates": f"{self.rows} turns and rests",
-            "turns": f"{self.rows} turns and rests",
-        }.get(self.kind, f"{self.rows} poses and blocks")
+        singular, plural = UNITS.get(self.kind, ("pose or block", "poses and blocks"))
+        return count_words(self.rows, singular, plural)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 import sqlite3
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -112,6 +113,20 @@ def test_an_unknown_run_names_the_nearest() -> None:
 def test_a_run_without_poses_is_no_table_yet(golden) -> None:
     with Record() as record, golden.refused(RecordError):
         table_of(record, begin(record))
+
+
+def test_one_measurement_is_not_many() -> None:
+    with Record() as record:
+        run = replace(record.run(begin(record)), rows=1)
+    kinds = ("poses", "positions", "turns", "still")
+    assert [replace(run, kind=kind).extent for kind in kinds] == [
+        "1 pose",
+        "1 position",
+        "1 turn or rest",
+        "1 pose or block",
+    ]
+    assert replace(run, bench={}).extent == "1 row"
+    assert replace(run, kind="turns", rows=23).extent == "23 turns and rests"
 
 
 def test_events_are_listed_in_order() -> None:
