@@ -16,6 +16,7 @@ from rig.services.next_steps import result_rows
 from rig.services.page_words import page_step
 from rig.services.tables import with_run_ids
 from rig.web.frame import news
+from rig.web.pages.run_record import shortened
 from rig.web.parts import for_page, with_labels
 
 SUGGESTED = (
@@ -99,6 +100,13 @@ def test_the_steady_state_is_one_sentence() -> None:
     early = {"steady-state": _result(1.0), "steady-state-time": _result(0.02, std=3.85)}
     assert result_rows(early)[0].value == "Reached at most 7.7 h after power-on."
     assert result_rows({"steady-state": _result(0.0)})[0].value == "Not confirmed in this run. There is no forecast."
+
+
+def test_the_message_of_a_run_is_whole() -> None:
+    text = 30 * "a reason, " + "and what to do"
+    assert shortened("message", text) == text
+    assert shortened("columns", text) == f"{text[:200]} ..."
+    assert shortened("step (deg)", "10") == "10"
 
 
 def test_a_message_on_settings_has_the_labels_of_the_form() -> None:

@@ -206,6 +206,7 @@ def _new_dwells(run: str, after_number: int) -> tuple[list[tuple[int, Any]], Run
 LOOKS = {"pass": "good", "fail": "bad", "marginal": "doubt"}
 FORMATS = {"csv": ("CSV", "csv"), "event-model": ("Bluesky events", "jsonl")}  # label, and ending of the file
 SHOWN = 200  # characters of a setting
+MESSAGE = "message"
 
 
 def register(desk: Desk) -> None:
@@ -248,7 +249,7 @@ class OneRun:
                 with box("stack"):
                     words("Settings", "title")
                     for part in _circumstances(run):
-                        facts({name: value[:SHOWN] for name, value in part.items() if value})
+                        facts({name: shortened(name, value) for name, value in part.items() if value})
             with div("stack"):
                 if run.bench and run.rows:
                     self._lay_out_over_time()
@@ -347,9 +348,14 @@ def _results(run: Run) -> None:
                     words(row.name)  # as a limit of the bench file names it
 
 
+def shortened(name: str, value: str) -> str:
+    """The beginning of a long setting; the message of a run is whole, because its end says what to do."""
+    return value if name == MESSAGE or len(value) <= SHOWN else f"{value[:SHOWN]} ..."
+
+
 def _circumstances(run: Run) -> tuple[dict[str, str], ...]:
     """The run and its settings, the instruments, the constants of sensor and rig."""
-    message = {"message": for_page(page_step(run.message).text)} if run.message else {}
+    message = {MESSAGE: for_page(page_step(run.message).text)} if run.message else {}
     settings = {setting_label(name): setting_text(value) for name, value in run.settings.items()}
     constants = {setting_label(name): setting_text(value) for name, value in run.constants.items()}
     return {"procedure": run.procedure, "bench or file": run.source, **message, **settings}, run.instruments, constants
