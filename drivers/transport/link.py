@@ -11,6 +11,7 @@ A link counts its bytes: a simulated clock needs the number that has not arrived
 
 from __future__ import annotations
 
+import os
 import socket
 import termios
 from collections.abc import Callable, Iterator
@@ -160,8 +161,7 @@ class Link:
         try:
             line = OpenConnection(_open_port(self._parsed))
         except (*LOST, ValueError) as error:
-            reason = (error.strerror if isinstance(error, OSError) else "") or error  # without the error's number
-            raise LinkRefused(f"{self._place}: cannot be opened ({reason})", _remedy(self._parsed)) from error
+            raise LinkRefused(f"{self._place}: cannot be opened ({_reason(error)})", _remedy(self._parsed)) from error
         self.clock.wait_readable(line, 0.0)  # a simulated clock finds the other end before the first byte
         return line
 
@@ -300,6 +300,14 @@ def _open_port(url: Url) -> SocketPort | SerialPort | DatagramPort:
     if url.scheme in UDP:
         return DatagramPort(url.host, url.port, listens=url.scheme == "udpin")
     return SocketPort(url.host, url.port)
+
+
+def _reason(error: Exception) -> str:
+    """Why a port cannot be opened, without the number of the error and the path, which the message has already."""
+    number = getattr(error, "errno", None)
+    if isinstance(error, serial.SerialException) and number:
+        return os.strerror(number)
+    return (error.strerror if isinstance(error, OSError) else "") or str(error)
 
 
 def _remedy(url: Url) -> str:

@@ -47,6 +47,8 @@ class Technician:
 
 OVEN_ANSWER_S = 0.5  # an answer of the oven, with a margin
 MOVING = ("alpha", "beta", "positioner")
+STILL_MOVES = "may still move: press the emergency stop, or switch its drive off"
+STILL_HEATS = "may still heat: switch it off by hand"
 
 
 class Absent:
@@ -183,10 +185,14 @@ class Rig:
         for mover in movers:
             if isinstance(mover, CanHalt):
                 _failure(mover.halt)
-        failed = [(f"{mover.name} may still move", _failure(cast(Stage, mover).stop)) for mover in movers]
+        failed = [(mover.name, STILL_MOVES, _failure(cast(Stage, mover).stop)) for mover in movers]
         if (oven := self.drivers.get("oven")) is not None:
-            failed.append((f"{oven.name} may still heat", _failure(lambda: cast(Oven, oven).run(False))))
-        return [f"{instrument}: {failure}" for instrument, failure in failed if failure is not None]
+            failed.append((oven.name, STILL_HEATS, _failure(lambda: cast(Oven, oven).run(False))))
+        return [
+            f"{name} {danger}. The command to stop failed: {str(failure).removeprefix(f'{name}: ')}"
+            for name, danger, failure in failed
+            if failure is not None
+        ]
 
     def _moving_drivers(self) -> list[Driver]:
         """Stages and positioner."""

@@ -53,7 +53,8 @@ class Wiring:
         try:
             return cast(Driver, module.connect(address, self.links, instrument.parse_settings(), role))
         except LinkRefused as error:
-            raise InstrumentFailed(f"{role} ({instrument.driver}) at {address.url}: {error}") from error
+            reason = str(error).removeprefix(f"{role}: ").removeprefix(f"{address.url}: ")
+            raise InstrumentFailed(f"{role} ({instrument.driver}) at {address.url}: {reason}") from error
 
     def _address(self, role: str) -> Address:
         if not self.bench.instruments[role].simulated:

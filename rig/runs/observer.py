@@ -36,12 +36,13 @@ NEXT_STEP = Choice("interrupted", "What should the run do next?", choices=get_ar
 @dataclass(frozen=True)
 class Outcome:
     """The end of a run: complete, stopped or failed. `error`: why it is not complete. `moving`: instruments that did
-    not stop.
+    not stop. `retried`: a person wanted the run to continue, and this is why it could not.
     """
 
     run: Run
     error: Exception | None = None
     moving: tuple[str, ...] = ()
+    retried: bool = False
 
 
 class Observer:

@@ -147,7 +147,7 @@ def _after_decision(record: Record, outcome: Outcome, observer: Observer, trace:
                 record.exclude(run, [record.next_number(run) - 1], REPEATED)
             outcome = _resume(record, run, observer, trace=trace)
         except (DriverError, RigError) as error:  # such as an instrument that still does not answer
-            outcome = Outcome(record.run(run), error, outcome.moving)  # nothing has stopped these since
+            outcome = Outcome(record.run(run), error, outcome.moving, retried=True)  # nothing has stopped these since
         except KeyboardInterrupt as stop:  # before the run went on
             outcome = Outcome(record.run(run), _error_of(stop, outcome.run, observer), outcome.moving)
     return outcome

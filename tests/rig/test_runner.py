@@ -269,6 +269,7 @@ def test_an_unreachable_instrument_is_named_and_nothing_is_written(url: str) -> 
         with pytest.raises(InstrumentFailed, match=r"oven \(omega_cn7500\) at .* Check") as error:
             run_small(record, Bench.model_validate(document))
         assert record.runs() == []
+    assert str(error.value).count(url.partition("?")[0]) == 1
     assert url in str(error.value)
 
 

@@ -216,7 +216,7 @@ class Mover:
     def _told(self, what: str) -> None:
         self._log.append(f"{self.name} {what}")
         if what == self._fails:
-            raise ZeroDivisionError("whatever it is")
+            raise ZeroDivisionError(f"{self.name}: whatever it is")
 
     def halt(self) -> None:
         self._told("halt")
@@ -233,7 +233,10 @@ def test_all_are_told_to_stop_before_the_first_is_waited_for() -> None:
     movers: dict[str, Any] = {"alpha": Mover("alpha", log, "halt"), "beta": Mover("beta", log, "stop")}
     clock = GuardedClock(SimulatedClock())
     rig = Rig(BENCH, movers | {"oven": Mover("oven", log)}, clock, None, (), PersonLink())
-    assert rig.stop() == ["beta may still move: whatever it is"]
+    assert rig.stop() == [
+        "beta may still move: press the emergency stop, or switch its drive off. "
+        "The command to stop failed: whatever it is"
+    ]
     assert log == ["alpha halt", "beta halt", "alpha stop", "beta stop", "oven run False"]
 
 

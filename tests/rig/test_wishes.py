@@ -133,6 +133,7 @@ def test_an_instrument_that_does_not_come_back_is_told_and_asked_about_again(mon
         outcome = start(record, read_bench(), *small_sweep(), watch)
     assert [str(seen.error) for seen in watch.outcomes][1:] == ["beta does not answer"]
     assert [seen.moving for seen in watch.outcomes] == [("beta may still move",)] * 2  # until something stops it
+    assert [seen.retried for seen in watch.outcomes] == [False, True]
     assert (outcome.run.state, outcome.run.rows) == ("failed", 7)
 
 

@@ -63,5 +63,5 @@ def test_a_port_nobody_listens_on_is_refused() -> None:
 
 
 def test_a_serial_line_that_is_not_there_is_refused() -> None:
-    with pytest.raises(LinkRefused, match="Check the device's path"):
+    with pytest.raises(LinkRefused, match=r"line: cannot be opened \(No such file or directory\)\. Check the device's"):
         open_link("serial:/dev/no-such-line", SimulatedClock())

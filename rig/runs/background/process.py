@@ -12,6 +12,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
+from datetime import UTC, datetime
 from typing import cast
 
 from procedures.catalogue import find
@@ -53,8 +54,10 @@ class Attendant(StatusWriter):
 
     def interrupted(self, outcome: Outcome) -> Decision:
         """Wait at rest for the decision of a person."""
-        by_a_person = isinstance(outcome.error, Stopped)
-        self.publish(error="" if by_a_person else str(outcome.error), moving=outcome.moving)
+        reason = "" if isinstance(outcome.error, Stopped) else str(outcome.error)
+        if outcome.retried:  # else the page would look as before the click on Continue
+            reason = f"continuing failed at {datetime.now(UTC):%H:%M:%S} UTC: {reason}"
+        self.publish(error=reason, moving=outcome.moving)
         return cast(Decision, self._answer(NEXT_STEP, "resume", "paused"))
 
     def _answer(self, question: Question, proposed: str, phase: str) -> str:
