@@ -234,8 +234,10 @@ def test_all_are_told_to_stop_before_the_first_is_waited_for() -> None:
     clock = GuardedClock(SimulatedClock())
     rig = Rig(BENCH, movers | {"oven": Mover("oven", log)}, clock, None, (), PersonLink())
     assert rig.stop() == [
-        "beta may still move: press the emergency stop, or switch its drive off. "
-        "The command to stop failed: whatever it is"
+        (
+            "beta may still move: press the emergency stop, or switch its drive off. "
+            "The command to stop failed: whatever it is"
+        )
     ]
     assert log == ["alpha halt", "beta halt", "alpha stop", "beta stop", "oven run False"]
 
