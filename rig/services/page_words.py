@@ -23,11 +23,12 @@ BLOCK = re.compile(rf"[:\s]*\n+ {{4}}{COMMAND}[^\n]*\n*")  # a line of its own, 
 QUOTED_COMMAND = re.compile(rf"`{COMMAND}{WORDS}(?P<options>[^`]*)`")
 BARE = re.compile(rf"(?<!the )(?<!a ){COMMAND}{WORDS}{OPTIONS}")
 LONGER = re.compile(r" \(--([\w-]+) ([\d.e+]+)\)")
-OPTION_WORDS = (  # options of `rig import` in messages, as the fields of its page
+OPTION_WORDS = (  # options of commands in messages, as the fields of their pages
     (re.compile(r"import it with(?= \(the page)"), "import it"),
     (re.compile(r"with --column, (?:by its number, )?such as \S+"), "on the page Import"),
     (re.compile(r"--column (\w+)=[^\s:]*:([\w/]+)"), r"\2 as the unit of \1"),
     (re.compile(r"with --topic(?=:)"), "at Table of the file"),
+    (re.compile(r"give the file of that bench with --bench"), "choose that bench under Measure on, page Run"),
     (re.compile(r"; --bad-lines skip skips them"), ""),
     (re.compile(r"--constant (\w+)=([^\s);,]+)"), r"the constant \1 = \2"),
 )

@@ -8,14 +8,19 @@ from pathlib import Path
 
 import pytest
 
+from calibrations.design.experiment import Experiment
+from rig.bench import read_bench
+from rig.bench.file import HAND
 from rig.bench.result_names import RESULTS, label
 from rig.files import home
+from rig.planning.next_experiment import as_proposed
 from rig.record import Record
 from rig.runs.background.status import Status
 from rig.services.next_steps import result_rows
 from rig.services.page_words import page_step
 from rig.services.tables import with_run_ids
 from rig.web.frame import news
+from rig.web.pages.next_experiment import preparation
 from rig.web.pages.run_record import shortened
 from rig.web.parts import for_page, with_labels
 
@@ -50,6 +55,11 @@ SUGGESTED = (
         ("`rig show RUN --poses` lists all", "the page Model lists all", {"Model": "/?data=x.csv"}),
         ("a log needs t_s (in `rig import`, --constant sample_rate_hz=100)",
          "a log needs t_s (in the page Import, the constant sample_rate_hz = 100)", {"Import": "/import?file=x.csv"}),
+        (
+            'planned for "simulated hand"; give the file of that bench with --bench.',
+            'planned for "simulated hand"; choose that bench under Measure on, page Run.',
+            {},
+        ),
         ("errors of the rig report nothing", "errors of the rig report nothing", {}),
         ("`rig doctor --recover F` copies rows", "`rig doctor --recover F` copies rows", {}),
     ],
@@ -100,6 +110,14 @@ def test_the_steady_state_is_one_sentence() -> None:
     early = {"steady-state": _result(1.0), "steady-state-time": _result(0.02, std=3.85)}
     assert result_rows(early)[0].value == "Reached at most 7.7 h after power-on."
     assert result_rows({"steady-state": _result(0.0)})[0].value == "Not confirmed in this run. There is no forecast."
+
+
+def test_a_run_that_the_bench_cannot_do_has_no_button() -> None:
+    sweep = Experiment("sweep", {"step_deg": 10.0, "face": "both"}, (), "for its physics", duration_s=600.0)
+    assert preparation(sweep) == {"Prepare this run": "/run?procedure=sweep&step_deg=10&face=both"}
+    by_hand = as_proposed(replace(sweep, duration_s=None), read_bench(HAND), None)
+    assert "but not on this bench: the bench has no alpha" in by_hand.why
+    assert preparation(by_hand) == {}
 
 
 def test_the_message_of_a_run_is_whole() -> None:

@@ -9,9 +9,10 @@ from urllib.parse import urlencode
 
 from calibrations.presentation.report.report import next_takes, next_words
 from procedures.settings import setting_label, setting_text
+from rig.services.page_words import page_step
 from rig.services.search import Cancelled
 from rig.web.calculations import Visit
-from rig.web.parts import afresh, box, buttons, div, message, waiting, words
+from rig.web.parts import afresh, box, buttons, div, for_page, message, waiting, words
 
 if TYPE_CHECKING:
     from calibrations.design.experiment import Experiment
@@ -44,8 +45,16 @@ async def show_next(visit: Visit, plan: Plan) -> None:
     if experiment is None:
         note.delete()
         return
-    settings = {name: setting_text(value) for name, value in experiment.settings.items()}
-    labelled = replace(experiment, settings={setting_label(name): text for name, text in settings.items()})
+    settings = {setting_label(name): setting_text(value) for name, value in experiment.settings.items()}
+    text = " ".join([next_words(replace(experiment, settings=settings)), next_takes(experiment), *notes])
     with afresh(place):
-        words(" ".join([next_words(labelled), next_takes(experiment), *notes]), "quiet")
-        buttons({"Prepare this run": f"/run?{urlencode({'procedure': experiment.procedure, **settings})}"})
+        words(for_page(page_step(text).text), "quiet")
+        buttons(preparation(experiment))
+
+
+def preparation(experiment: Experiment) -> dict[str, str]:
+    """The button that prepares the run, with its address; none without a duration: then the bench cannot do it."""
+    if experiment.duration_s is None:
+        return {}
+    settings = {name: setting_text(value) for name, value in experiment.settings.items()}
+    return {"Prepare this run": f"/run?{urlencode({'procedure': experiment.procedure, **settings})}"}
