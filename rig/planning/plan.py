@@ -298,7 +298,7 @@ def _range(angles_deg: Sequence[float]) -> str:
     low, high = min(angles_deg), max(angles_deg)
     if low == high:
         return f"{low:g}"
-    return f"{first:g} to {last:g}" if {first, last} == {low, high} else f"{low:g} .. {high:g}"
+    return f"{first:g} to {last:g}" if {first, last} == {low, high} else f"between {low:g} and {high:g}"
 
 
 def _path_words(poses: Sequence[Pose]) -> Iterator[str]:
