@@ -23,18 +23,17 @@ def storage(plan: Plan, free_bytes: int) -> str:
     return f"{size(plan.bytes)} on the disk; {size(free_bytes)} are free{lacking}"
 
 
-HAND_CHECKS = (
-    "the sensor's cable is long enough to turn it upside down",
-    "the table is firm, and no motor shakes it",
-)
+LONG_CABLE = "the sensor's cable is long enough to turn it upside down"
+HAND_CHECKS = (LONG_CABLE, "the table is firm, and no motor shakes it")
 
 
-def checks(plan: Plan) -> list[str]:
-    """Checks that only a person can do, before anything moves."""
+def checks(plan: Plan, question: Confirm | None = None) -> list[str]:
+    """Checks that only a person can do, before anything moves; none that `question` beside them asks as well."""
     actions = [step.what for step in plan.steps]
     level = any("level" in question.name for question in plan.asked)
     if not plan.reach:
-        return list(HAND_CHECKS)
+        is_asked = question is not None and "cable long enough" in question.text
+        return [line for line in HAND_CHECKS if line != LONG_CABLE or not is_asked]
     lines = [
         "the cables are long enough for the whole range, and no object or person is in the way of the stages",
         "the sensor is fastened as in the drawing, with pin 1 at the drawn place",

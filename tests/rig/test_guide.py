@@ -118,6 +118,13 @@ def test_the_page_says_it_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
     assert plan_facts(planned(), read_bench())["Stores"].endswith("on the disk; 1.0 kB are free: not enough space")
 
 
+def test_a_plan_without_poses_and_turns_promises_none() -> None:
+    facts = plan_facts(planned("level-check"), read_bench())
+    assert facts["Stores"] == "its readings, and no poses"
+    assert facts["Turns alpha"].startswith("to 0 deg; the limits are ")
+    assert facts["Turns beta"].startswith("from 0 to 180 deg; ")
+
+
 def test_the_page_shows_before_a_resume_what_remains_with_the_same_limits() -> None:
     bench, whole = read_bench(), planned()
     with Record() as record:

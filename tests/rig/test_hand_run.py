@@ -379,7 +379,7 @@ def test_the_status_of_a_run_by_hand_has_the_guidance_and_no_stage(rig_home: Pat
         )
     prepared = (before_start(planned, read_bench(HAND)), before_resume(run, planned, read_bench(HAND), None))
     assert all(each.attitude is None for each in prepared)
-    assert all("upside down" in each.checks[0] for each in prepared)
+    assert [sum("upside down" in line for line in each.checks) for each in prepared] == [1, 1]
 
 
 def test_without_stages_the_checks_are_those_of_a_hand() -> None:

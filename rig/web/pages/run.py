@@ -308,7 +308,7 @@ def _show(planned: Plan, bench: Bench) -> None:
     """Show a plan."""
     rows = plan_facts(planned, bench)
     if planned.asked:
-        rows["Asks you"] = "; ".join(dict.fromkeys(question.text for question in planned.asked))
+        rows["Asks you"] = " ".join(dict.fromkeys(question.text for question in planned.asked))
     facts(rows)
     lines = [(duration(stretch.start_s), stretch.words.replace("  ", ", ")) for stretch in stretches(planned)]
     if lines:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from nicegui import ui
 
-from calibrations.text import capital
+from calibrations.text import capital, count_words
 from rig.bench import Bench
 from rig.drawings import Attitude, strip
 from rig.files import free_bytes, home
@@ -32,7 +32,7 @@ class Preparation:
 def before_start(plan: Plan, bench: Bench) -> Preparation:
     """The preparation of a new run. The sensors of a batch keep the names of the bench file."""
     question = first_question(plan)
-    by_hand = [for_page(capital(line)) for line in checks(plan)]
+    by_hand = [for_page(capital(line)) for line in checks(plan, question)]
     sensor = None if bench.sensors else {"name": bench.sensor.name, "serial": bench.sensor.serial}
     batch = {"Sensors": ", ".join(bench.sensors)} if bench.sensors else {}
     return Preparation(
@@ -69,12 +69,14 @@ def before_resume(run: Run, plan: Plan, bench: Bench, attitude: Attitude | None)
 def plan_facts(plan: Plan, bench: Bench) -> dict[str, str]:
     """Duration, storage, reach and limits of a plan."""
     faster = ", simulated: it passes faster" if bench.simulated else ""
+    poses = count_words(plan.poses, "pose", "poses")
     rows = {
         "Takes": f"{_duration_in_words(plan.duration_s)}{faster}",
-        "Stores": f"{plan.poses} poses, {storage(plan, free_bytes(home()))}",
+        "Stores": f"{poses}, {storage(plan, free_bytes(home()))}" if plan.poses else "its readings, and no poses",
     }
     for role, ((low, high), (least, most)) in plan.reach.items():
-        reach = f"from {low:g} to {high:g} deg; the limits are {least:g} to {most:g} deg"
+        turns = f"from {low:g} to {high:g} deg" if low < high else f"to {low:g} deg"
+        reach = f"{turns}; the limits are {least:g} to {most:g} deg"
         rows[f"Turns {role}"] = for_page(reach)
     rows["Stops"] = for_page("; ".join(stops(bench)))
     return rows
