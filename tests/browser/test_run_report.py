@@ -71,6 +71,7 @@ def test_the_next_experiment_is_planned_below_the_report(workbench: Workbench, t
     note = page.locator(".report .next-experiment")
     expect(note).to_contain_text("To separate stage-zero-offset from axis-misalignment, run sweep with face = both")
     expect(page.locator(".verdict .headline")).to_contain_text("misses stage-zero-offset")
+    expect(page.locator(".verdict .chip.doubt")).to_have_text("ambiguous")
     note.scroll_into_view_if_needed()
     workbench.shot(page, "run-report-next")
     note.get_by_role("button", name="Prepare this run").click()

@@ -8,6 +8,7 @@ from __future__ import annotations
 import html
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from threading import Thread
 from typing import Any
@@ -23,6 +24,7 @@ from rig.services.search import Cancelled
 from rig.services.session import ModelSession
 from rig.web.calculations import Visit
 from rig.web.desk import Desk
+from rig.web.pages.model_verdict import LOOKS
 from rig.web.pages.next_experiment import show_next
 from rig.web.parts import box, button, div, notify_error, shown, words
 
@@ -33,7 +35,27 @@ FITTED = (
     "fit(); this.contentWindow.addEventListener('resize', e => { if (this.clientWidth !== this.wide) "
     "{ this.wide = this.clientWidth; fit() } }); this.wide = this.clientWidth"
 )
-HEADLINE = re.compile(r"<h1[^>]*>(.*?)</h1>", re.DOTALL)
+HEADLINE = re.compile(r'<span class="state ([\w-]+)">(.*?)</span>.*?<h1[^>]*>(.*?)</h1>', re.DOTALL)
+
+CHIPS = {verdict.value: look for verdict, look in LOOKS.items()}
+
+
+@dataclass(frozen=True)
+class ReportVerdict:
+    """The verdict of a report: its label, as in the report, the look of the label, and the first sentence."""
+
+    label: str
+    look: str
+    headline: str
+
+
+def verdict_of(text: str) -> ReportVerdict | None:
+    """The verdict at the head of a report; None for a text without one."""
+    found = HEADLINE.search(text)
+    if found is None:
+        return None
+    label, headline = (html.unescape(re.sub(r"<[^>]*>", "", part)).strip() for part in found.group(2, 3))
+    return ReportVerdict(label, CHIPS.get(found[1], "plain"), headline)
 
 
 class RunReport:
@@ -67,9 +89,10 @@ class RunReport:
         with self.place:
             ui.html(frame_html(f"Report on {data}", text), sanitize=False)
         self.headline.clear()
-        if headline := HEADLINE.search(text):
+        if (verdict := verdict_of(text)) is not None:
             with self.headline, box("row-of verdict").props("role=status"):
-                words(html.unescape(re.sub(r"<[^>]*>", "", headline[1])).strip(), "headline grow")
+                words(verdict.label, f"chip {verdict.look}")
+                words(verdict.headline, "headline grow")
                 button("Report below", "south", self.see, "flat dense")
         if (session := self.desk.opened(data)) is not None:
             with self.following:
