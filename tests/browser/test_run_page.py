@@ -293,6 +293,7 @@ def test_a_bench_is_chosen_before_a_run_and_stays_during_it(workbench: Workbench
     expect(page.get_by_text("positioner")).to_have_count(0)  # the demonstration rig has none
     expect(page.get_by_label("Procedure")).to_have_value(re.compile("^hand-positions"))
     expect(page.get_by_label("target (g)")).to_have_value("0.002")
+    expect(page.get_by_text("A person turns an accelerometer from rest to rest; no stage. Excites")).to_be_visible()
     other = workbench.visit("/run?procedure=soak&duration_s=43200")
     expect(other.get_by_label("Measure on")).to_have_value(re.compile("demonstration rig"))
     expect(other.get_by_text("Takes", exact=True)).to_be_visible()

@@ -12,7 +12,7 @@ from urllib.parse import urlencode
 from fastapi import Request
 from nicegui import ui
 
-from calibrations.text import duration
+from calibrations.text import capital, duration
 from drivers.errors import NotWired
 from procedures.catalogue import Procedure, find, paths, summary
 from procedures.errors import NoInstrument, SettingError
@@ -200,7 +200,8 @@ class PlanForm:
     def _show_settings(self) -> None:
         """Show the settings of the selected procedure."""
         procedure = self.procedure
-        self.about.set_text(" ".join(procedure.doc.partition("\n\n")[2].split("Source")[0].split()))
+        about = procedure.doc.partition("\n\n")[2].split("Source")[0]
+        self.about.set_text(" ".join([f"{capital(procedure.summary)}.", *about.split()]))  # the list may cut its end
         self.meaning.clear()
         with self.meaning:
             facts({setting_label(name): meaning(procedure, name) for name in procedure.defaults})
