@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -51,6 +52,12 @@ def test_runs_are_searched_and_one_is_opened_and_noted(workbench: Workbench, run
     with Record() as record:
         assert [(event.what, event.text) for event in record.events(runs[2])] == [("note", "the door was open")]
     workbench.shot(page, "run")
+    page.get_by_label("Note").fill(300 * "w")
+    page.get_by_role("button", name="Save").click()
+    expect(page.get_by_role("cell", name=300 * "w")).to_be_visible()
+    assert page.locator(".events").evaluate("e => e.scrollWidth <= e.clientWidth")
+    time = page.get_by_role("cell", name=re.compile(r"^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d$")).last
+    assert time.evaluate("e => e.clientHeight") < 40  # one line
 
 
 @pytest.mark.slow

@@ -22,6 +22,7 @@ from rig.services.tables import with_run_ids
 from rig.web.frame import news
 from rig.web.pages.next_experiment import preparation
 from rig.web.pages.run_record import shortened
+from rig.web.pages.run_report import ReportVerdict, verdict_of
 from rig.web.parts import for_page, with_labels
 
 SUGGESTED = (
@@ -118,6 +119,17 @@ def test_a_run_that_the_bench_cannot_do_has_no_button() -> None:
     by_hand = as_proposed(replace(sweep, duration_s=None), read_bench(HAND), None)
     assert "but not on this bench: the bench has no alpha" in by_hand.why
     assert preparation(by_hand) == {}
+
+
+def test_the_head_of_a_report_has_its_verdict() -> None:
+    head = (
+        '<span class="state ambiguous">ambiguous</span><span class="what">x</span>\n<h1>It <b>misses</b> a &amp; b</h1>'
+    )
+    assert verdict_of(f"<body>{head}</body>") == ReportVerdict("ambiguous", "doubt", "It misses a & b")
+    other = verdict_of(head.replace("ambiguous", "found"))
+    assert other is not None
+    assert (other.label, other.look) == ("found", "plain")
+    assert verdict_of("<h1>no report</h1>") is None
 
 
 def test_the_message_of_a_run_is_whole() -> None:

@@ -310,7 +310,8 @@ class OneRun:
             events = events_in_words(record, self.run.run)
         with afresh(self.events):
             if events:
-                table(("time (UTC)", "event", "what"), [_event(event) for event in events])
+                with div("events"):
+                    table(("time (UTC)", "event", "what"), [_event(event) for event in events])
             else:
                 words("No events.", "quiet small")
 
