@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import replace
 
 import pytest
@@ -12,13 +13,15 @@ from procedures.settings import parse
 from rig.bench import read_bench
 from rig.bench.file import DEMO, HAND
 from rig.cli.terminal.watch import Quiet
+from rig.errors import InstrumentFailed
 from rig.files import home
 from rig.lease import lease
 from rig.record import Record
 from rig.runs.background import control
 from rig.runs.background import status as status_file
+from rig.runs.background.process import Attendant
 from rig.runs.background.status import KEPT_ESTIMATES, Order, Status, file, folder, keys, lock, read, remove_old_files
-from rig.runs.runner import start
+from rig.runs.runner import Outcome, start
 from rig.web.pages.run_live import count_words, stop_words
 from tests.rig.rigging import POSES, SMALL
 
@@ -127,6 +130,24 @@ def test_a_run_that_reaches_its_target_early_is_whole() -> None:
     assert last is not None
     assert (last.done, last.total) == (23, 23)
     assert count_words(last) == "23 turns and rests"
+
+
+@pytest.mark.parametrize("retried", [False, True])
+def test_a_click_on_continue_that_fails_changes_what_the_page_says(
+    monkeypatch: pytest.MonkeyPatch, retried: bool
+) -> None:
+    folder().mkdir(parents=True)
+    monkeypatch.setattr(Attendant, "_answer", lambda *_: "end")
+    with Record() as record:
+        name = record.begin("sweep", {}, bench={}, identities={}, configuration="", source="a test", constants={})
+        outcome = Outcome(record.run(name), InstrumentFailed("beta is away"), retried=retried)
+    Attendant(Order(KEY, "sweep"), read_bench(None)).interrupted(outcome)
+    with lease(home(), lock(KEY), "a test"):
+        status = read(KEY)
+    assert status is not None
+    assert re.sub(r"\d\d:\d\d:\d\d", "TIME", status.error) == (
+        "continuing failed at TIME UTC: beta is away" if retried else "beta is away"
+    )
 
 
 def test_the_status_of_a_killed_process_is_that_of_its_record() -> None:
