@@ -257,6 +257,13 @@ def test_texts_of_many_bars_are_short() -> None:
         assert bars.texts[0] == text
 
 
+def test_an_error_far_below_the_noise_floor_has_a_bar() -> None:
+    (panel,) = panels(waterfall([Level("linear", 9.0, 9.5, "9 mg"), Level("+ a", 0.3, 0.2, "0.1 mg")]))
+    bars = next(series for series in panel.series if isinstance(series, Bars))
+    assert panel.x.low is not None
+    assert bars.base == panel.x.low < 0.3
+
+
 def test_texts_of_bars_keep_their_size() -> None:
     (trace,) = [trace for trace in figure(waterfall(levels(warm())), "k")["data"] if trace["type"] == "bar"]
     assert trace["constraintext"] == "none"

@@ -34,6 +34,7 @@ from calibrations.presentation.residual import ChannelResidual, choices, first_c
 from calibrations.text import milli_amount, rounded
 
 BELOW = 0.5  # times the floor: where the logarithmic axis begins
+SHORTEST_SHARE = 0.7  # of the smallest error, if that is below: its bar is seen
 FEWEST = 4  # bars that there is room for: one alone is no thicker than they
 MANY_BARS = 8  # more bars have short texts, which fit beside them
 NEAR = 1.15  # times the floor: as good as noise
@@ -95,17 +96,18 @@ def waterfall(steps: Sequence[Level], words: Measure = Measure()) -> Chart:
     """
     excess, unseen = (np.array([getattr(level, name) for level in steps], float) for name in ("seen", "unseen"))
     reach = 2.2 * max(*excess, *unseen, 3.0)
+    begin = min([BELOW, *(SHORTEST_SHARE * value for value in excess if value > 0)])
     colours = [MODEL, *(GOOD if value < NEAR else MEASURED for value in excess[1:])]
     units = [f" ({level.rms})" if len(steps) <= MANY_BARS else "" for level in steps]
     texts = [f"{rounded(level.seen)} ×{in_unit}" for level, in_unit in zip(steps, units, strict=True)]
-    text_inside = [log10(max(value, BELOW) / BELOW) > LONG * log10(reach / BELOW) for value in excess]
+    text_inside = [log10(max(value, begin) / begin) > LONG * log10(reach / begin) for value in excess]
     hover = [f"{rounded(value)} × {words.over} on {words.unseen}" for value in unseen]
     series = (
-        Span(BELOW, 1.0, "x"),
-        Bars(BELOW, excess, colours, texts, text_inside, starts=np.fmax(excess, unseen)),  # behind the diamond
+        Span(begin, 1.0, "x"),
+        Bars(begin, excess, colours, texts, text_inside, starts=np.fmax(excess, unseen)),  # behind the diamond
         Points(unseen, np.arange(len(steps), dtype=float), colour=UNSEEN, symbol="diamond", size=10, hover=hover),
     )
-    x = Axis(words.axis, log=True, low=BELOW, high=reach)
+    x = Axis(words.axis, log=True, low=begin, high=reach)
     y = Axis(low=-0.5, high=max(len(steps), FEWEST) - 0.5, names=tuple(level.name for level in steps), reverse=True)
     return single_chart(Panel(series, x, y), 0.6 + ROW * max(len(steps), FEWEST))
 
