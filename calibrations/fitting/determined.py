@@ -59,9 +59,15 @@ def explain_undetermined(fit: Fit) -> str | None:
         return _warn_of_unchecked_rows(fit, lone)
     rows = "positions" if fit.table.type.magnitude else "rows"
     times = f"{np.sqrt(variance):.1f}" if variance < 1e4 else "many"
+    prediction = f"the prediction of another one is {times} times less certain than one measurement"
+    if all(estimate.identified for estimate in fit.params.values()):
+        return (
+            f"the {fit.table.n} {rows} determine the {len(fit.theta)} parameters and cannot check them: {prediction}; "
+            "measure at more orientations to check the model"
+        )
     return (
-        f"the {len(fit.theta)} parameters are not identifiable from {fit.table.n} {rows}: the prediction of "
-        f"another one is {times} times less certain than one measurement; measure at more orientations"
+        f"the {len(fit.theta)} parameters are not identifiable from {fit.table.n} {rows}: {prediction}; "
+        "measure at more orientations"
     )
 
 
