@@ -72,6 +72,13 @@ def gravity_unit(outputs: Array) -> str:
     return next((unit for unit, one_g in magnitudes.items() if 0.8 < size / one_g < 1.25), "counts")
 
 
+def unit_at_rest(outputs: Array) -> str:
+    """The unit of still outputs, shape (n, 3): that of gravity, V for small numbers with decimals, else "counts"."""
+    unit = gravity_unit(outputs)
+    is_voltage = np.max(np.abs(outputs)) <= HIGHEST_V and np.any(outputs % 1 != 0)
+    return "V" if unit == "counts" and is_voltage else unit
+
+
 def field_unit(outputs: Array) -> str:
     """uT where outputs, shape (n, 3), have the magnitude of the earth's field, for any hard iron; else ""."""
     size = float(np.median(np.linalg.norm(outputs - sphere_centre(outputs), axis=1)))

@@ -18,11 +18,11 @@ from calibrations.importing.plausible import (
     field_unit,
     find_log_time_doubt,
     find_time_doubt,
-    gravity_unit,
     likely_unit,
+    unit_at_rest,
 )
 from calibrations.importing.sheet import Sheet
-from calibrations.importing.units import UNITS, ColumnMapping, column_unit, split_unit
+from calibrations.importing.units import UNITS, ColumnMapping, column_unit, parse_unit, split_unit
 from calibrations.table import AXES, NUMBERS, Array
 from calibrations.tables import KINDS, TURN_MARKS
 
@@ -44,7 +44,7 @@ COLUMN_NAMES: Mapping[str, Mapping[str, tuple[str, ...]]] = {
 }  # fmt: skip
 AXIS = r"(?:^|[^a-z])(?P<axis>[xyz])(?:[^a-z]|$)"
 TEMPERATURE = r"temp(?!s$|o$)|thermo"
-TIME = r"^t(_?s)?$|time|elapsed|seconds|zeit|^temps$|^tiempo|^tempo$"
+TIME = r"^t(_?s)?$|time|elapsed|seconds|^minutes$|^hours$|zeit|^temps$|^tiempo|^tempo$"
 SCATTER = r"std|stdev|sigma|noise|scatter|deviation"
 # meaning of a name, the first match; {axis} is the letter x, y or z in it; some names are German or French
 NAME_PATTERNS: Mapping[str, Sequence[tuple[str, str]]] = {
@@ -299,6 +299,8 @@ def _unit(laid: Sheet, name: str, target: str, values: Array) -> str:
     stated_unit, target_unit = laid.units[laid.header.index(name)], column_unit(target)
     if stated_unit:
         return stated_unit if not target_unit or UNITS[stated_unit][0] == target_unit else ""
+    if target == "t_s" and name.lower() in ("minutes", "hours"):
+        return parse_unit(name)
     return likely_unit(target, values)
 
 
@@ -357,8 +359,8 @@ def _with_scatter(mapping: list[ColumnMapping]) -> list[ColumnMapping]:
 
 
 def _with_gravity(mapping: list[ColumnMapping], values: Mapping[str, Array]) -> list[ColumnMapping]:
-    """The mapping in which axes have the unit that gives 1 g, else counts; axes of a magnetometer uT, where it fits."""
-    for names, unit_of_all in ((KINDS["positions"].outputs, gravity_unit), (KINDS["fields"].outputs, field_unit)):
+    """The mapping in which axes have the unit that gives 1 g, else V or counts; axes of a magnetometer uT, where it fits."""
+    for names, unit_of_all in ((KINDS["positions"].outputs, unit_at_rest), (KINDS["fields"].outputs, field_unit)):
         axes = {m.name: m.file_column for m in mapping if m.name in names and not m.unit and m.file_column in values}
         if len(axes) == len(AXES):
             unit = unit_of_all(np.column_stack([values[column] for column in axes.values()]))

@@ -43,7 +43,7 @@ MOST_DRAWN = 4000
 TIMES = ("s", "min", "h", "ms")  # units of a time in doubt, for a person
 COLOURS = (MEASURED, CANDIDATE, QUIET)
 OUTPUT_UNITS = {
-    "a": ("g", "mg", "m/s2", "counts"),
+    "a": ("g", "mg", "m/s2", "V", "mV", "counts"),
     "m": ("uT", "counts"),
     "g": ("deg/s", "rad/s", "counts"),
 }  # of outputs

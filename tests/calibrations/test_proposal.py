@@ -66,6 +66,7 @@ def test_columns_are_proposed_by_their_names_and_values(header: str, expected: s
         ("noise y", 0.7, "vy_std_v=noise y"),
         ("samples", 500, "n=samples"),
         ("Zeit [min]", 3, "t_s=Zeit [min]:min"),
+        ("minutes", 3, "t_s=minutes:min"),
         ("temps (min)", 3, "t_s=temps (min):min"),
         ("temperature (s)", 3, "t_s=temperature (s):s"),
         ("humidity", 40, None),
@@ -87,7 +88,7 @@ def test_radians_are_proposed_as_such() -> None:
     assert proposed(f"alpha,beta,vx_v\n{rows}") == {"alpha_deg=alpha:rad", "beta_deg=beta:rad"}
 
 
-@pytest.mark.parametrize(("one_g", "unit"), [(1.0, "g"), (9.81, "m/s2"), (4096.0, "counts")])
+@pytest.mark.parametrize(("one_g", "unit"), [(1.0, "g"), (9.81, "m/s2"), (4096.0, "counts"), (2.5, "V")])
 def test_three_axes_are_positions_in_the_unit_that_gravity_gives(one_g: float, unit: str) -> None:
     rows = "".join(f"{k},{one_g * (k == 0)},{one_g * (k == 1)},{one_g * (k == 2)},7\n" for k in range(3))
     content = f"time,accX,accY,accZ,gyrX\n{rows}"

@@ -333,12 +333,12 @@ class ImportPage:
 
 
 def _sample_text(sheet: Sheet, name: str) -> str:
-    """The first values of a column and their range, or its first words."""
+    """The first values of a column and the range of the first rows, or its first words."""
     values = sample_values(sheet, name)
     if not len(values):
         return ", ".join(dict.fromkeys(row[sheet.header.index(name)] for row in sheet.sample[:20]))[:60]
     first = ", ".join(f"{value:.6g}" for value in values[:3])
-    return for_page(first if len(values) <= 3 else f"{first} … ({_range_text(values)})")
+    return for_page(first if len(values) <= 3 else f"{first} … (first {len(values)} rows: {_range_text(values)})")
 
 
 def _range_text(values: NDArray[np.float64]) -> str:
