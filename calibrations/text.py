@@ -69,8 +69,8 @@ def in_prefix(value: float, std: float | None, unit_name: str) -> tuple[float, s
     return (1.0, unit_name) if reach >= 0.1 or reach == 0 else add_prefix(unit_name, reach)
 
 
-def time_text(value: float, std: float | None) -> str:
-    """A time since a beginning: `2.86(42)`, or `at most 7.7` where its expanded uncertainty (k = 2) is larger."""
+def positive_text(value: float, std: float | None) -> str:
+    """A time or a spread, 0 or more: `2.86(42)`, or `at most 7.7` if the expanded uncertainty (k = 2) is larger."""
     if _is_known(std) and value < 2 * std:
         return f"at most {rounded(value + 2 * std, 2)}"
     return estimate_text(value, std)
@@ -115,6 +115,11 @@ def rounded(value: float, digits: int = 3) -> str:
     if SMALL <= power <= LARGE:
         return minus(f"{round(value, digits - 1 - power):.{max(digits - 1 - power, 0)}f}")
     return minus(f"{value / 10.0**power:.{digits - 1}f}") + times_ten_to(power)
+
+
+def few_digits(value: float, digits: int = 3) -> str:
+    """A value whose uncertainty is not known: a whole number in full, another one as `rounded`."""
+    return minus(f"{value:.0f}") if value.is_integer() and abs(value) < 10.0**LARGE else rounded(value, digits)
 
 
 def freedom_text(freedom: float) -> str:
@@ -208,7 +213,7 @@ def interval(low: float, high: float) -> str:
 
 def to_hundredth(value: float, length: float) -> str:
     """A value to a hundredth of `length`: `43.3` of 60; to six decimals where it is 0."""
-    return f"{round(value, max(1, 1 - exponent(length)) if length > 0 else 6):.10g}"
+    return f"{round(value, max(1, 1 - exponent(length)) if length > 0 else 6) + 0.0:.10g}"
 
 
 def bound(value: float, limit: float | Sequence[float]) -> str:
@@ -253,6 +258,13 @@ def join_words(names: Iterable[str], word: str = "and") -> str:
     """`a`, `a and b`, `a, b and c`."""
     names = list(names)
     return f" {word} ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def parameter_words(key: str) -> str:
+    """A parameter by its key in words: `the scale factor of x`, `the nonorthogonality of x and y`."""
+    name, _, axes = key.rpartition(".") if set(key.rpartition(".")[2]) <= set("xyz") else (key, "", "")
+    words = re.sub(r"[-_.]", " ", name.removeprefix("axis-").replace("gyro-", "gyroscope "))
+    return f"the {words} of {join_words(axes)}" if axes else f"the {words}"
 
 
 def capital(text: str) -> str:

@@ -78,7 +78,7 @@ class FieldCourse(Course):
 
     @property
     def uncertainty(self) -> tuple[float, str]:
-        """The largest standard uncertainty of a parameter as a share of the field, and the parameter's key.
+        """The largest standard uncertainty of a parameter as a share of the field, and the parameter's words.
 
         Infinite with fewer than FEWEST positions.
         """
@@ -96,7 +96,7 @@ def fit_fields(table: Table) -> Fit:
 
 
 def largest_uncertainty(fitted: Fit) -> tuple[float, str]:
-    """The largest standard uncertainty of a parameter as a share of the field, and its key."""
+    """The largest standard uncertainty of a parameter as a share of the field, and its words."""
     (strength,) = fitted.model.estimates("field-strength")
     return largest_error(fitted, lambda key, _, std: std if key.startswith("soft-iron") else std / strength.value)
 

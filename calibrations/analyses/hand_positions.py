@@ -32,6 +32,7 @@ from calibrations.fitting.fit import Fit, fit
 from calibrations.model import Estimate
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
+from calibrations.text import parameter_words
 
 FEWEST = 12  # nine parameters, and three positions that check them
 OUTPUTS = ("ax", "ay", "az")
@@ -148,7 +149,7 @@ class HandCourse(Course):
 
     @cached_property
     def uncertainty(self) -> tuple[float, str]:
-        """The largest standard uncertainty of a parameter as an error at 1 g, in g, and the parameter's key.
+        """The largest standard uncertainty of a parameter as an error at 1 g, in g, and the parameter's words.
 
         Infinite with fewer than FEWEST positions.
         """
@@ -172,20 +173,20 @@ def fit_positions(table: Table) -> Fit:
 
 
 def largest_uncertainty_g(fit: Fit) -> tuple[float, str]:
-    """The largest standard uncertainty of a parameter as an error at 1 g, in g, and its key."""
+    """The largest standard uncertainty of a parameter as an error at 1 g, in g, and its words."""
     scale = {e.axis: abs(e.value) for e in fit.model.estimates("scale-factor")}
     return largest_error(fit, lambda key, e, std: np.radians(std) if key.startswith(ANGLES) else std / scale[e.axis])
 
 
 def largest_error(fit: Fit, error_of: Callable[[str, Estimate, float], float]) -> tuple[float, str]:
-    """The largest error of a parameter, and its key; infinite with the first that is not identified.
+    """The largest error of a parameter, and its words; infinite with the first that is not identified.
 
     error_of  from key, estimate and standard uncertainty of a parameter: its error at full scale
     """
     errors: dict[str, float] = {}
     for key, estimate in fit.params.items():
         if estimate.std is None or not estimate.identified:
-            return np.inf, key
+            return np.inf, parameter_words(key)
         errors[key] = float(error_of(key, estimate, estimate.std))
     worst = max(errors, key=lambda key: errors[key])
-    return errors[worst], worst
+    return errors[worst], parameter_words(worst)

@@ -46,7 +46,7 @@ class TurnCourse(HandCourse):
 
     @cached_property
     def uncertainty(self) -> tuple[float, str]:
-        """The largest standard uncertainty, and the parameter's key. Infinite with fewer than FEWEST rests."""
+        """The largest standard uncertainty, and the parameter's words. Infinite with fewer than FEWEST rests."""
         if len(self.positions) < FEWEST or self.table is None:
             return np.inf, ""
         try:
@@ -61,7 +61,7 @@ def fit_turns(table: Table) -> Fit:
 
 
 def largest_uncertainty(fitted: Fit) -> tuple[float, str]:
-    """The largest relative standard uncertainty of a scale factor, or of an angle in rad, and its key."""
+    """The largest relative standard uncertainty of a scale factor, or of an angle in rad, and its words."""
 
     def error(key: str, estimate: Estimate, std: float) -> float:
         if key.startswith(BIAS):

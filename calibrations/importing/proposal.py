@@ -359,7 +359,7 @@ def _with_scatter(mapping: list[ColumnMapping]) -> list[ColumnMapping]:
 
 
 def _with_gravity(mapping: list[ColumnMapping], values: Mapping[str, Array]) -> list[ColumnMapping]:
-    """The mapping in which axes have the unit that gives 1 g, else V or counts; axes of a magnetometer uT, where it fits."""
+    """The mapping in which axes have the unit that fits them at rest; axes of a magnetometer uT, where it fits."""
     for names, unit_of_all in ((KINDS["positions"].outputs, unit_at_rest), (KINDS["fields"].outputs, field_unit)):
         axes = {m.name: m.file_column for m in mapping if m.name in names and not m.unit and m.file_column in values}
         if len(axes) == len(AXES):

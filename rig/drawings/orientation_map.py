@@ -33,8 +33,12 @@ def orientation_map(guidance: Guidance) -> list[str]:
         squares = ("  ".join(marks.get((x, y, z), " ") for x in COLUMNS) for z, _ in layers)
         lines.append(f"{('+y', '  ', '-y')[1 - y]}   {'   '.join(f'{square:<13}' for square in squares)}".rstrip())
     lines.append("   " + "   ".join(f"{'-x':<5}{'+x':<8}" for _ in layers).rstrip())
-    taken_count = sum(mark == TAKEN for mark in marks.values())
-    return [*lines, f"{TAKEN} taken ({taken_count} of {len(marks)})   {WANTED} next   {LACKING} not yet"]
+    return [*lines, f"{_covered(marks)}   {WANTED} next   {LACKING} not yet"]
+
+
+def _covered(marks: dict[tuple[int, int, int], str]) -> str:
+    """The mark and number of directions near which there is a position."""
+    return f"{TAKEN} covered ({sum(mark == TAKEN for mark in marks.values())} of {len(marks)} directions)"
 
 
 # The same as SVG.
@@ -63,9 +67,8 @@ def _content(guidance: Guidance) -> Iterator[str]:
     for centre, half, name in DISCS:
         yield svg.text((centre[0] - 92, 66), name.replace("-", "−"), 14, svg.QUIET, bold=True)
         yield from _disc(centre, half, marks)
-    counts = f"{TAKEN} taken ({sum(mark == TAKEN for mark in marks.values())} of {len(marks)})   {WANTED} next"
-    of = "directions of the field: " if guidance.north else ""
-    yield svg.text((555, 287), f"{of}{counts}   ○ not yet", 13, svg.QUIET)
+    of = "field: " if guidance.north else ""
+    yield svg.text((555, 287), f"{of}{_covered(marks)}   {WANTED} next   ○ not yet", 13, svg.QUIET)
 
 
 def _disc(centre: tuple[int, int], half: int, marks: dict[tuple[int, int, int], str]) -> Iterator[str]:

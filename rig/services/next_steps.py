@@ -13,10 +13,11 @@ from calibrations.text import (
     columns,
     concise,
     estimate_text,
+    few_digits,
     in_prefix,
     join_words,
+    positive_text,
     rounded,
-    time_text,
     unit,
 )
 from rig.record import Run
@@ -24,7 +25,9 @@ from rig.services.page_words import PageStep, page_step
 
 SPREADS = re.compile("tolerance|wander|residual")  # uncertainties themselves
 RELATIVE = {"": "%", "1/K": "%/K"}  # units of a relative change, by that of the result
-SPREAD_DIGITS, TIME_DIGITS = 2, 3
+REPEATED = re.compile("(bias|scale)-(as-is|power|mount)")  # spreads with an uncertainty, at least 0
+FACTORS = re.compile("correction-")  # of a matrix near 1: all with the same decimals
+SPREAD_DIGITS, TIME_DIGITS, FACTOR_DECIMALS = 2, 3, 6
 # By the name of a result that is beyond its limit: what to look at. The first that fits counts.
 REMEDIES = {
     r"level-offset": "the half turn removes the offset of the level from the tilt; have the level adjusted",
@@ -158,8 +161,16 @@ class ResultRow:
 
 def _value_on_page(name: str, result: Mapping[str, Any]) -> str:
     value, std, unit_name = _readable(name, result)
-    digits = _digits(name, result)
-    return f"{estimate_text(value, std) if digits is None else rounded(value, digits)} {unit(unit_name)}".rstrip()
+    return f"{_number_text(name, result, value, std) or estimate_text(value, std)} {unit(unit_name)}".rstrip()
+
+
+def _number_text(name: str, result: Mapping[str, Any], value: float, std: float | None) -> str:
+    """The number of a result that its uncertainty does not round; "" for another one."""
+    if (digits := _digits(name, result)) is not None:
+        return few_digits(value, digits)
+    if not std:
+        return f"{value:.{FACTOR_DECIMALS}f}" if FACTORS.match(name.rpartition("/")[2]) else few_digits(value)
+    return positive_text(value, std) if REPEATED.match(name.rpartition("/")[2]) else ""
 
 
 def result_rows(
@@ -202,7 +213,7 @@ def _steady_sentence(reached: bool, parts: Mapping[str, Any]) -> str:
         if "time" not in times:
             return "Reached."
         time = parts["time"]
-        return f"Reached {time_text(time['value'], time['std'])} {time['unit']} after power-on."
+        return f"Reached {positive_text(time['value'], time['std'])} {time['unit']} after power-on."
     if "expected" in times:
         interval = f", {times['earliest']} to {times['latest']} (95 %)" if times["earliest"] != times["latest"] else ""
         return f"{NOT_CONFIRMED} Forecast: steady {times['expected']} after power-on{interval}."
@@ -213,8 +224,7 @@ def _steady_sentence(reached: bool, parts: Mapping[str, Any]) -> str:
 
 def _value_in_terminal(name: str, result: Mapping[str, Any]) -> str:
     value, std, unit_name = _readable(name, result)
-    digits = _digits(name, result)
-    text = concise(value, std) if digits is None else rounded(value, digits)
+    text = _number_text(name, result, value, std) or concise(value, std)
     return _ascii(f"{text} {unit_name}".rstrip())
 
 

@@ -398,6 +398,13 @@ def test_the_album_holds_every_picture_once() -> None:
     assert all(picture.title and picture.caption.endswith(".") for picture in pictures)
 
 
+def test_only_a_stage_turns_clockwise() -> None:
+    for found, is_turned in ((warm(), True), (by_hand(), False)):
+        captions = [picture.caption for picture in steps_album(found) if picture.name.startswith("effect-")]
+        assert captions
+        assert all(("clockwise" in caption) == is_turned for caption in captions)
+
+
 def test_only_the_greatest_falls_are_drawn() -> None:
     (step,) = warm().steps
     idle = [Step(f"e{k}", step.after, step.after) for k in range(MOST_CURVES)]

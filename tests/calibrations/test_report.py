@@ -25,7 +25,7 @@ from calibrations.presentation.report.parameters import constant_facts, model_fa
 from calibrations.presentation.report.report import next_takes, next_words, report, summary
 from calibrations.presentation.residual import column_label
 from calibrations.table import Table
-from calibrations.text import estimate_in_prefix, milli_amount, probability, rounded, typeset
+from calibrations.text import estimate_in_prefix, few_digits, milli_amount, probability, rounded, typeset
 from tests.calibrations.test_pictures import EFFECTS, by_hand, hand_table, warm, warm_table
 
 EMPTY = {"meta", "br", "link", "hr", "img"}
@@ -164,7 +164,7 @@ def test_it_holds_every_parameter_with_its_uncertainty() -> None:
         for e in term.estimates:
             assert f"{e.name} {e.axis} {estimate_in_prefix(e.value, e.std, e.unit)}" in text
     reference = warm().end.model.terms[-1].constants["reference_c"]
-    assert f"{rounded(reference, 6)} (a reference value, not fitted)" in text
+    assert f"{few_digits(reference, 4)} (a reference value, not fitted)" in text
 
 
 def test_it_says_why_a_parameter_is_not_identified() -> None:
@@ -298,7 +298,7 @@ def test_the_provenance_has_labels_and_readable_times() -> None:
     }
     assert constant_facts(constants) == {
         "constant: serial": "1234567",
-        "constant: noise inflation x": "0.982863",
+        "constant: noise inflation x": "0.983",
         "constant: sample rate (Hz)": "1000",
         "constant: interruptions": "2026-11-29 21:07:36 UTC stopped by a person",
     }

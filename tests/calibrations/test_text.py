@@ -11,9 +11,11 @@ from calibrations.text import (
     estimate_in_prefix,
     estimate_text,
     expand_uncertainty,
+    few_digits,
     interval,
     join_words,
     milli_amount,
+    parameter_words,
     probability,
     rounded,
     typeset,
@@ -25,6 +27,18 @@ from calibrations.text import (
 
 def test_names_are_joined_by_commas_and_and() -> None:
     assert join_words(["a", "b", "c"]) == "a, b and c"
+
+
+@pytest.mark.parametrize(
+    ("key", "shown"),
+    [
+        ("axis-nonorthogonality.xy", "the nonorthogonality of x and y"),
+        ("gyro-scale-factor.x", "the gyroscope scale factor of x"),
+        ("field-strength", "the field strength"),
+    ],
+)
+def test_a_parameter_has_words(key: str, shown: str) -> None:
+    assert parameter_words(key) == shown
 
 
 @pytest.mark.parametrize(
@@ -72,6 +86,14 @@ def test_outputs_are_in_the_prefix_that_reads_best(value: float, std: float | No
 def test_a_sign_is_for_expanded_uncertainties(value: float, expanded: float, shown: str) -> None:
     assert expand_uncertainty(value, expanded) == shown
     assert value_text(value, expanded) == re.sub(r" ± [^)]*|[()]", "", shown)
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [(0.0, "0"), (142.255, "142"), (1234.0, "1234"), (0.0410672, "0.0411"), (-2.5e-6, "−2.50 × 10⁻⁶")],
+)
+def test_a_number_without_uncertainty_has_few_digits(value: float, shown: str) -> None:
+    assert few_digits(value) == shown
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -65,6 +66,7 @@ def test_the_directions_so_far_go_with_the_guidance(calm: Book) -> None:
     assert not last.moves
     assert "0.001" not in last.text
     assert "wanted 1 mg" in last.text
+    assert re.search(r"; the (scale factor of [xyz]|bias of [xyz]|nonorthogonality of . and .) is known to", last.text)
     assert np.array(last.taken) == pytest.approx(ups(calm), abs=0.02)
 
 

@@ -327,7 +327,7 @@ def test_a_position_is_marked_by_a_sound_and_a_tick() -> None:
 
 def test_the_map_shows_taken_lacking_and_next() -> None:
     lines = orientation_map(Guidance("", (1.0, 0.0, 0.0), (UP, (0.0, -1.0, 0.0))))
-    assert lines[-1].startswith("● taken (2 of 26)")
+    assert lines[-1].startswith("● covered (2 of 26 directions)")
     assert lines[2].count("●") == 1
     assert lines[2].count("◎") == 1
     assert lines[3].count("●") == 1
@@ -352,7 +352,7 @@ def test_the_drawing_shows_the_next_orientation_and_both_halves() -> None:
     guidance = Guidance("position 3: +x side up", (1.0, 0.0, 0.0), (UP, (0.0, -1.0, 0.0)))
     drawn = orientation_drawing(guidance)
     assert "position 3: +x side up" in drawn
-    assert "taken (2 of 26)" in drawn
+    assert "covered (2 of 26 directions)" in drawn
     assert drawn.count("<circle") == 2 + 2 * 17 + 2  # discs, 26 orientations of which both show 8, the next one twice
     height = {name: float(y) for y, name in re.findall(r'y="([\d.]+)"[^>]*font-size="15.*?>(..)</text>', drawn)}
     assert len(height) == 3

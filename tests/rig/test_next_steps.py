@@ -105,6 +105,11 @@ def test_a_result_and_its_limit_have_a_unit_that_is_easy_to_read() -> None:
         "scale-x": of(1.006169, 2.5e-5, "V/g"),
         "improvement-x": of(0.97648, 0.00048, "", [0.9, 1]),
         "rate-residual-z": of(0.00247273, None, "deg/s"),
+        "field": of(0.0410672, None, "per mille"),
+        "scale-as-is-x": of(0.0, 2.2e-5, ""),
+        "bias-power-x": of(1.2e-4, 0.2e-4, "V"),
+        "correction-xy": of(0.00029481532, None, ""),
+        "rounds": of(1234.0, None, ""),
     }
     assert [(row.value, row.limit) for row in result_rows(results)] == [
         ("785.5(73) µV", "at most 3.5 mV"),
@@ -115,6 +120,11 @@ def test_a_result_and_its_limit_have_a_unit_that_is_easy_to_read() -> None:
         ("1.006169(25) V/g", ""),
         ("97.648(48) %", "90 to 100 %"),
         ("0.0025 deg/s", ""),
+        ("0.0411 per mille", ""),
+        ("at most 0.0044 %", ""),
+        ("120(20) µV", ""),
+        ("0.000295", ""),
+        ("1234", ""),
     ]
     assert results_table(results)[1].split()[1:] == ["785.5(73)", "uV", "at", "most", "3.5", "mV"]
 

@@ -176,9 +176,11 @@ def _fall(step: Step[Fit]) -> float:
 
 def _curve(step: Step[Fit], discovery: Discovery[Fit]) -> Picture:
     remark = "" if discovery.steps else "This effect was tried and not kept: it does not explain the residual. "
+    is_turned = np.any(step.before.table.optional("direction", 0.0) != 0)
+    sides = " (full line clockwise, broken line anticlockwise)" if is_turned else ""
     caption = (
-        f"{remark}Left: the residual before, and the part explained by {step.name} (full line clockwise, broken "
-        "line anticlockwise). Right: the residual after, on the same scale."
+        f"{remark}Left: the residual before, and the part explained by {step.name}{sides}. Right: the residual after, "
+        "on the same scale."
     )
     if len(drawn_channels(step.before, change_of(step))) < len(step.before.channels):
         caption += " Outputs that it does not change are left out."

@@ -32,7 +32,7 @@ from calibrations.presentation.chart import (
     stack_panels,
 )
 from calibrations.table import Array
-from calibrations.text import add_prefix, in_milli, rounded, time_text
+from calibrations.text import add_prefix, in_milli, positive_text, rounded
 
 COLOURS = {"x": BLUE, "y": VERMILION}
 TIME = "time since power-on (h)"
@@ -185,7 +185,7 @@ def _steady(course: Course) -> Iterator[Rule | Note]:
     if course.state and course.state.from_start:
         words = "steady from the first reversal on"
     elif time is not None:
-        words = f"steady after {time_text(*(value_s / HOUR_S for value_s in time))} h"
+        words = f"steady after {positive_text(*(value_s / HOUR_S for value_s in time))} h"
     up = course.values[0] > course.values[-1]
     yield Note(words, 1, 1 if up else 0, "xy", "right", "top" if up else "bottom")
 

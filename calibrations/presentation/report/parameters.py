@@ -14,7 +14,7 @@ from calibrations.model import Estimate, Model
 from calibrations.presentation.document import Remark, Section, Table
 from calibrations.presentation.residual import column_label
 from calibrations.table import AXES
-from calibrations.text import as_written, bound, estimate_text, in_prefix, minus, unit, with_times
+from calibrations.text import as_written, bound, estimate_text, few_digits, in_prefix, minus, unit, with_times
 
 GENERAL = Markup(
     "G<sub>c</sub> = M (S G<sub>r</sub> + b): from raw outputs G<sub>r</sub> in {raw} to G<sub>c</sub> in "
@@ -64,13 +64,15 @@ def name_of_file(source: str) -> str:
 
 def constant_facts(constants: Mapping[str, str | float]) -> dict[str, str]:
     """The constants of data for the provenance, with labels: `constant: sample rate (Hz)`."""
-    return {f"constant: {column_label(name)}": _constant_text(value) for name, value in constants.items()}
+    return {f"constant: {column_label(name)}": _constant_text(name, value) for name, value in constants.items()}
 
 
-def _constant_text(value: str | float) -> str:
-    """A number to six digits, a whole one such as a serial number with all; a text with readable times."""
+def _constant_text(name: str, value: str | float) -> str:
+    """A number to six digits, an estimate to three; a whole one such as a serial number with all; a readable time."""
     if isinstance(value, str):
         return with_times(value)
+    if name.startswith("noise_inflation"):
+        return few_digits(value)
     return as_written(value) if float(value).is_integer() else minus(f"{value:.6g}")
 
 

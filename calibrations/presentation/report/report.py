@@ -42,15 +42,16 @@ from calibrations.table import Array
 from calibrations.text import (
     capital,
     estimate_text,
+    few_digits,
     join_words,
     keep_units_together,
     milli_amount,
-    minus,
     probability,
     rounded,
     typeset,
 )
 
+REFERENCE_DIGITS = 4  # of a reference value, whose uncertainty is not known
 LONG_MIN = 120  # longer durations are given in hours
 
 
@@ -342,7 +343,7 @@ def _parameters(term: Term, is_added: bool) -> Iterable[tuple[str, ...]]:
         (
             typeset(term.effect.constant_docs.get(name) or column_label(name)),
             "–",
-            f"{minus(f'{value:.6g}')} (a reference value, not fitted)",
+            f"{few_digits(value, REFERENCE_DIGITS)} (a reference value, not fitted)",
             "",
         )
         for name, value in term.constants.items()

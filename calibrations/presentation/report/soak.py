@@ -15,7 +15,7 @@ from calibrations.presentation.charts.soak import soak_album
 from calibrations.presentation.document import Items, Page, Remark, Section, Table
 from calibrations.presentation.page import html
 from calibrations.presentation.report.parameters import verdicts
-from calibrations.text import estimate_text, in_milli, join_words, minus, rounded, time_text
+from calibrations.text import estimate_text, in_milli, join_words, minus, positive_text, rounded
 
 LARGEST_WANDER_K = 1.0  # peak to peak; ambient that changes by more is not constant
 TOLERANCE = (
@@ -200,7 +200,7 @@ def _gap(gap: RecordGap) -> str:
 def _hours(time: tuple[float, float] | None) -> str:
     if time is None:
         return "–"
-    return time_text(*(value / HOUR_S for value in time))
+    return positive_text(*(value / HOUR_S for value in time))
 
 
 def _span_h(soak: Soak) -> str:

@@ -20,7 +20,7 @@ from calibrations.importing.sheet import Sheet
 from calibrations.importing.topics import SeveralTopics
 from calibrations.importing.units import ColumnMapping, column_unit
 from calibrations.table import Constant
-from calibrations.text import join_words
+from calibrations.text import interval, join_words
 from calibrations.text import unit as unit_text
 from rig.services.importing import (
     TIMES,
@@ -343,5 +343,5 @@ def _sample_text(sheet: Sheet, name: str) -> str:
 
 def _range_text(values: NDArray[np.float64]) -> str:
     """`1.5 to 3.5`, or the one value that all have."""
-    low, high = f"{values.min():.6g}", f"{values.max():.6g}"
-    return low if low == high else f"{low} to {high}"
+    low, high = float(values.min()), float(values.max())
+    return f"{low:.6g}" if low == high else interval(low, high)
