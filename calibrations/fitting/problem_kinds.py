@@ -295,9 +295,8 @@ def make_problem(model: Model, table: Table) -> Problem:
 def check_kind(kind: str, source: str) -> None:
     """Raises ModelError for tables to which no model is fitted; known before any sample of theirs is read."""
     if kind not in FITTED_KINDS:
-        raise ModelError(
-            f"{source}: models are fitted to poses, positions, motion, rates or turns, not to a table of {kind}"
-        )
+        table = "a still record" if kind == "still" else f"a table of {kind}"
+        raise ModelError(f"{source}: models are fitted to poses, positions, motion, rates or turns, not to {table}")
 
 
 def _check_effects(model: Model, table: Table) -> None:

@@ -180,7 +180,7 @@ def history(
         try:
             calibrations.append(_calibration(record, data, run, model))
         except (CalibrationError, RecordError) as error:
-            passed_over[data] = str(error)
+            passed_over[data] = _without_name(str(error), data)
     if not calibrations:
         raise _no_calibration_error(record, sensor, passed_over)
     calibrations, excluded = _most_frequent_kind(calibrations)
@@ -208,7 +208,7 @@ def latest(record: Record, sensor: str, model: Model) -> Calibration:
         try:
             return _calibration(record, data, run, model)
         except (CalibrationError, RecordError) as error:
-            passed_over[data] = str(error)
+            passed_over[data] = _without_name(str(error), data)
     raise _no_calibration_error(record, sensor, passed_over)
 
 
@@ -248,8 +248,14 @@ def _runs(record: Record, sensor: str) -> list[tuple[str, Run]]:
     ]
 
 
+def _without_name(reason: str, data: str) -> str:
+    """A reason without the name of its data at the beginning: the caller shows it before the reason."""
+    return reason.removeprefix(f"run {data}: ").removeprefix(f"{data}: ")
+
+
 def _no_calibration_error(record: Record, sensor: str, passed_over: Mapping[str, str]) -> RecordError:
-    reasons = f" This model cannot use its runs: {next(iter(passed_over.values()))}" if passed_over else ""
+    first = next((f"{data}: {reason}" for data, reason in passed_over.items()), "")
+    reasons = f" This model cannot use its runs: {first}" if first else ""
     sensor_names = sensors(record.runs())
     nearest = "" if sensor in sensor_names else did_you_mean(sensor, sensor_names)
     return RecordError(f"no calibration of the sensor {sensor!r} in the record.{reasons}{nearest}")

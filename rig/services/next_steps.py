@@ -20,6 +20,7 @@ from calibrations.text import (
     rounded,
     unit,
 )
+from rig.bench.result_names import label
 from rig.record import Run
 from rig.services.page_words import PageStep, page_step
 
@@ -54,16 +55,15 @@ LONGER = 4  # times as long halves a statistical uncertainty
 
 def next_steps(run: Run, excluded: Mapping[int, str]) -> list[str]:
     """The next steps after a run: for each verdict that is not a pass, and with the measured data."""
-    return [*_advice(run, excluded), *_commands(run)]
+    return [*_advice(run, excluded, str), *_advise_on_limits(run.results), *_commands(run)]
 
 
-def _advice(run: Run, excluded: Mapping[int, str]) -> list[str]:
-    """The steps that concern the measurement itself."""
+def _advice(run: Run, excluded: Mapping[int, str], name_text: Callable[[str], str]) -> list[str]:
+    """The steps that concern the measurement itself. `name_text` writes the name of a result."""
     return [
         *_advise_on_excluded(excluded),
-        *_advise_on_failures(run),
-        *_marginal(run),
-        *_advise_on_limits(run.results),
+        *_advise_on_failures(run, name_text),
+        *_marginal(run, name_text),
     ]
 
 
@@ -72,25 +72,25 @@ def _advise_on_excluded(excluded: Mapping[int, str]) -> Iterator[str]:
         yield f"Left out: {'; '.join(f'pose {number} ({reason})' for number, reason in excluded.items())}"
 
 
-def _advise_on_failures(run: Run) -> Iterator[str]:
+def _advise_on_failures(run: Run, name_text: Callable[[str], str]) -> Iterator[str]:
     """Results beyond their limits, those of one remedy together."""
     by_remedy: dict[str, list[str]] = {}
     for name in _with_verdict(run.results, "fail"):
         remedy = next(text for pattern, text in REMEDIES.items() if re.match(pattern, name.rpartition("/")[2]))
         by_remedy.setdefault(remedy, []).append(name)
     for remedy, names in by_remedy.items():
-        yield f"Fail: {join_words(names)}: {remedy.format(run=run.run)}"
+        yield f"Fail: {join_words(map(name_text, names))}: {remedy.format(run=run.run)}"
 
 
-def _marginal(run: Run) -> Iterator[str]:
+def _marginal(run: Run, name_text: Callable[[str], str]) -> Iterator[str]:
     """The value is too close to the limit; a longer measurement decides."""
     if names := _with_verdict(run.results, "marginal"):
         setting = next((name for name in LENGTHS if name in run.settings), None)
         longer = f" (--{setting.replace('_', '-')} {LONGER * run.settings[setting]:g})" if setting else ""
         verb = "reach" if len(names) > 1 else "reaches"
         yield (
-            f"Marginal: {join_words(names)} {verb} across the limit with its uncertainty; {LONGER} times the duration"
-            f"{longer} halves the uncertainty"
+            f"Marginal: {join_words(map(name_text, names))} {verb} across the limit with its uncertainty; "
+            f"{LONGER} times the duration{longer} halves the uncertainty"
         )
 
 
@@ -100,9 +100,14 @@ def _with_verdict(results: Mapping[str, Any], verdict: str) -> list[str]:
 
 def _advise_on_limits(results: Mapping[str, Any]) -> Iterator[str]:
     """A remark that a result without a limit has no verdict, and how to give it one."""
-    free = [name.rpartition("/")[2] for name, result in results.items() if result["limit"] is None]
-    if free:
-        yield f"No verdict without a limit: add one to limits.results of the bench file, such as `{free[0]}: ...`"
+    if name := _without_limit(results):
+        short = name.rpartition("/")[2]
+        yield f"No verdict without a limit: add one to limits.results of the bench file, such as `{short}: ...`"
+
+
+def _without_limit(results: Mapping[str, Any]) -> str:
+    """The name of the first result without a limit; "" for none."""
+    return next((name for name, result in results.items() if result["limit"] is None), "")
 
 
 def _commands(run: Run) -> Iterator[str]:
@@ -124,8 +129,20 @@ def _commands(run: Run) -> Iterator[str]:
 
 def page_steps(run: Run, excluded: Mapping[int, str]) -> list[PageStep]:
     """`next_steps` for a page."""
-    lines = (line.replace(f" {run.run}", "") for line in _advice(run, excluded))
+
+    def quoted(name: str) -> str:
+        return f'"{label(run.procedure, name)}"'
+
+    lines = (line.replace(f" {run.run}", "") for line in _advice(run, excluded, quoted))
     steps = [page_step(line, run.run, run.procedure) for line in lines]
+    if name := _without_limit(run.results):
+        steps.append(
+            PageStep(
+                f"No verdict without a limit. Write limits under limits.results in the bench file, for {quoted(name)} "
+                "for example; the last column of the table has the names of the results there.",
+                {},
+            )
+        )
     if run.state != "complete":
         steps.append(PageStep("The run is not complete. Resume it on the page Run.", {"Run": "/run"}))
     elif run.procedure == "check-standard":

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from rig.bench.result_names import label
 from rig.cli import COMMANDS
 from rig.record import Run
 from rig.services.next_steps import REMEDIES, next_steps, page_steps, result_rows, results_table
@@ -148,6 +149,16 @@ def test_a_page_has_buttons_in_place_of_commands(remedy: str, monkeypatch: pytes
     assert "--" not in step.text
     assert bool(step.to) == ("rig " in remedy)
     assert all(to.startswith("/") and "{" not in to for to in step.to.values())
+
+
+def test_a_page_names_results_in_words() -> None:
+    run = replace(
+        RUN, procedure="noise-floor", results={"noise-rms-x": result(None, None), "noise-pp-x": result("fail")}
+    )
+    fail, limit = (step.text for step in page_steps(run, {}))
+    assert fail.startswith(f'Fail: "{label("noise-floor", "noise-pp-x")}": look for vibration')
+    assert f'for "{label("noise-floor", "noise-rms-x")}" for example' in limit
+    assert not any("`" in text or "noise-" in text for text in (fail, limit))
 
 
 def test_a_page_proposes_the_longer_measurement() -> None:
