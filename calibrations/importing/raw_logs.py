@@ -52,8 +52,9 @@ def average_still_positions(log: Table, rate_hz: float) -> Table:
     bounds = still_intervals(samples, rate_hz)
     if len(bounds) < 2:
         count = "one still interval" if bounds else "no still intervals"
+        length = f"{log.n / rate_hz:.3g} s at {rate_hz:.4g} samples a second"
         remedy = "keep the sensor still for 1 s or more in each of many positions; for a log at rest use `rig noise`"
-        raise DataError(f"{log.source}: found {count}; {remedy}")
+        raise DataError(f"{log.source}: found {count} in {length}; if the log is longer, correct its time; {remedy}")
     if _is_alike(samples, bounds):
         raise DataError(
             f"{log.source}: {', '.join(log.output_names)} are the same in all {len(bounds)} still intervals within "

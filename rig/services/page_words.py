@@ -31,6 +31,10 @@ OPTION_WORDS = (  # options of commands in messages, as the fields of their page
     (re.compile(r"give the file of that bench with --bench"), "choose that bench under Measure on, page Run"),
     (re.compile(r"; --bad-lines skip skips them"), ""),
     (re.compile(r"--constant (\w+)=([^\s);,]+)"), r"the constant \1 = \2"),
+    (
+        re.compile(r"a line such as `# sample_rate_hz: \S+` above its header \(in the page Import, [^)]*\)"),
+        'the field "Sample rate (Hz)" of the page Import',
+    ),
 )
 
 

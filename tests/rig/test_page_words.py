@@ -75,6 +75,15 @@ def test_the_unit_is_named_in_place_of_its_option(golden) -> None:
     golden.same(page_step(line).text)
 
 
+def test_the_sample_rate_is_named_as_its_field() -> None:
+    line = (
+        "log.csv: a raw log needs the column t_s, or a line such as `# sample_rate_hz: 100` above its header "
+        "(in `rig import`, --constant sample_rate_hz=100)"
+    )
+    expected = 'log.csv: a raw log needs the column t_s, or the field "Sample rate (Hz)" of the page Import'
+    assert page_step(line).text == expected
+
+
 def test_a_notification_has_no_commands() -> None:
     running = Status("k", 1, "soak", "a rig", phase="running", run="r1")
     error = "stopped by a person; `rig resume r1` continues the run"
