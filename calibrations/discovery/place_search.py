@@ -21,6 +21,7 @@ from calibrations.discovery.search import first_order_cost
 from calibrations.discovery.significance import chance
 from calibrations.discovery.structural import StructuralSearch, fit_each_axis
 from calibrations.effects import Effect
+from calibrations.errors import TooFewRows
 from calibrations.fitting.determined import loses_parameters
 from calibrations.fitting.fit import Fit, refit
 from calibrations.fitting.noise_fit import deviance
@@ -64,9 +65,15 @@ class _Place:
 
 
 def search_places(start: Fit, effects: Mapping[str, Effect]) -> StructuralSearch | None:
-    """The effects and free forms that the model of `start` misses; None if no place acts beyond the noise."""
+    """The effects and free forms that the model of `start` misses; None if no place acts beyond the noise.
+
+    None as well for rows that do not determine the linear effects.
+    """
     report("searching for the places that act")
-    base = _fit_with_linear_effects(start, effects)
+    try:
+        base = _fit_with_linear_effects(start, effects)
+    except TooFewRows:  # then they show no place either
+        return None
     possible = _possible_places(base)
     acting = _acting_forms(base, possible).following_columns if possible else None
     if acting is None or not acting.by_place:

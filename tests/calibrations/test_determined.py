@@ -96,6 +96,13 @@ def test_adding_an_effect_on_ten_positions_says_so_too() -> None:
     assert "the 9 parameters are not identifiable from 10 positions" in str(found.caution)
 
 
+def test_eight_positions_that_cannot_show_a_place_have_a_result() -> None:
+    """The search for places frees nine parameters."""
+    found = discover(suarez().rows(np.arange(8)), read_model("common-scale"))
+    assert found.verdict == "ambiguous"
+    assert "the 8 positions determine the 4 parameters" in str(found.caution)
+
+
 def test_a_report_on_ten_positions_says_so_too() -> None:
     found = discover(suarez(), nine())
     assert not found.steps
