@@ -62,7 +62,8 @@ class _Stretch:
         output_text = _signed(1e3 * self.mean, "mV") if self.unit == "V" else f"{self.mean:+.3g} {self.unit}"
         sensed = self.unit in ("g", "field") or self.milli == f"m{self.unit}"
         value = sensed_text if sensed else f"{output_text} ({sensed_text})"
-        return f"{self.words}: {self.channel} is off by {value} on average, rms {self.excess:.3g} x the noise floor"
+        channel = "the magnitude" if self.channel == "norm" else self.channel
+        return f"{self.words}: {channel} is off by {value} on average, rms {self.excess:.3g} x the noise floor"
 
 
 def _signed(value: float, unit_name: str) -> str:

@@ -84,7 +84,7 @@ class StillRecord(Dataset[NoiseFit]):
 
     form = "samples"
     default_model = "still"
-    floor = "chance"
+    floor = "the scatter by chance"
     unseen = "the other half of the record"
     complete = "The model fails nowhere: the differences are chance."
 

@@ -28,8 +28,8 @@ from calibrations.text import (
 MEANS = {
     "white-noise": "velocity or angle random walk",
     "flicker-noise": "bias instability",
-    "rate-random-walk": "the bias wanders",
-    "quantisation-noise": "of the output's sum over time",
+    "rate-random-walk": "random walk of the bias",
+    "quantisation-noise": "error of the integrated output",
     "sinusoidal-noise": "amplitude",
     "gauss-markov-noise": "standard deviation",
 }

@@ -73,7 +73,7 @@ def test_a_field_that_follows_the_temperature_is_found_beside_iron() -> None:
 
 def test_where_it_fails_is_told_by_the_side_of_the_sensor() -> None:
     worst = compare(turned.sap6("HC"), FIELD).fails[0]
-    assert worst.text.startswith("side -z: norm is off by +")
+    assert worst.text.startswith("side -z: the magnitude is off by +")
     assert "‰ of the field" in worst.text
 
 

@@ -22,7 +22,7 @@ from calibrations.model import Estimate, Model, Term
 from calibrations.model.file import read_model
 from calibrations.presentation.chart import Chart, Panel, Picture
 from calibrations.presentation.report.parameters import constant_facts, model_facts
-from calibrations.presentation.report.report import next_takes, next_words, report, summary
+from calibrations.presentation.report.report import _constant, next_takes, next_words, report, summary
 from calibrations.presentation.residual import column_label
 from calibrations.table import Table
 from calibrations.text import estimate_in_prefix, few_digits, milli_amount, probability, rounded, typeset
@@ -314,6 +314,9 @@ def test_reference_values_of_a_gyroscope_are_in_words() -> None:
     docs = catalogue()["gyro-scale-factor"].constant_docs
     assert docs["turned_x"].startswith("turns about x")
     assert set(docs) == {"turned_x", "turned_y", "turned_z", "assumed"}
+    term = replace(read_model("gyroscope").terms[-1], effect=catalogue()["gyro-scale-factor"])
+    assert _constant(term, "turned_x", 1.0) == ("turns about x measured", "–", "yes", "")
+    assert _constant(term, "turned_x", 0.0)[2] == "no"
     text = Page(page()).text
     assert "reference (°C)" in text
     assert "reference_c" not in text

@@ -284,3 +284,12 @@ def test_each_sensor_of_a_still_record_has_its_own_unit(
         found = rig("noise", taken["run"], "--channel", channel, "--json").done().document
         assert found["unit"] == unit
         assert found["allan"]["deviation"][0] == pytest.approx(noise, rel=0.1)
+
+
+def test_the_summary_of_a_report_states_the_mismatch_once(rig: Rig, folder: Path) -> None:
+    volts = 1e-4 * np.random.default_rng(5).standard_normal(20_000)
+    write("white.csv", np.arange(len(volts)) / 100, vx_v=volts)
+    assert rig("report", "white.csv", "--out", "white.html").status == 0
+    lead = Path("white.html").read_text(encoding="utf-8").partition('<p class="lead">')[2].partition("</p>")[0]
+    assert "Remaining error" in lead
+    assert lead.count("times the scatter by chance") == 1

@@ -31,7 +31,7 @@ class GyroScaleFactor(Effect):
     turned_x = Constant(partial(is_turned, axis=0), doc="turns about x measured (1: yes, 0: no)")
     turned_y = Constant(partial(is_turned, axis=1), doc="turns about y measured (1: yes, 0: no)")
     turned_z = Constant(partial(is_turned, axis=2), doc="turns about z measured (1: yes, 0: no)")
-    assumed = Constant(_mean_of_turned, doc="scale of an axis without turns: the mean of the others")
+    assumed = Constant(_mean_of_turned, doc="scale factor of an axis without turns, taken as the mean of the others")
 
     def transduction(self, a: Array, table: Table, p: Values) -> Array:
         turned = np.array([p[f"turned_{axis}"] for axis in AXES]) > 0

@@ -51,6 +51,7 @@ from calibrations.text import (
     typeset,
 )
 
+YES_OR_NO = " (1: yes, 0: no)"  # at the end of a constant's description
 REFERENCE_DIGITS = 4  # of a reference value, whose uncertainty is not known
 LONG_MIN = 120  # longer durations are given in hours
 
@@ -339,17 +340,17 @@ def _parameters(term: Term, is_added: bool) -> Iterable[tuple[str, ...]]:
     shared = "all" if term.tied else "–"
     rows = [(e.name, e.axis or shared, *estimate_cells(e, "uncertainty not known")) for e in term.quantities]
     rows += [("curve", axis or shared, f"{n} coefficients", "") for axis, n in term.coefficients.items()]
-    rows += [
-        (
-            typeset(term.effect.constant_docs.get(name) or column_label(name)),
-            "–",
-            f"{few_digits(value, REFERENCE_DIGITS)} (a reference value, not fitted)",
-            "",
-        )
-        for name, value in term.constants.items()
-    ]
+    rows += [_constant(term, name, value) for name, value in term.constants.items()]
     for number, row in enumerate(rows):
         yield "" if number else f"{term.name}{' (added)' if is_added else ''}", *row
+
+
+def _constant(term: Term, name: str, value: float) -> tuple[str, str, str, str]:
+    """The row of a constant; one that is 1 or 0 is an answer."""
+    label = term.effect.constant_docs.get(name) or column_label(name)
+    if label.endswith(YES_OR_NO):
+        return typeset(label.removesuffix(YES_OR_NO)), "–", "yes" if value else "no", ""
+    return typeset(label), "–", f"{few_digits(value, REFERENCE_DIGITS)} (a reference value, not fitted)", ""
 
 
 def _next(discovery: Discovery[Fit]) -> tuple[Block, ...]:

@@ -36,7 +36,9 @@ class StillView(View[NoiseFit]):
         return {
             "mismatch / chance": f"{rounded(fit.pooled_excess)} ×",
             "on the other half": f"{rounded(fit.held_out_excess)} ×",
-            "Allan deviation is off by": ", ".join(f"{100 * value:.2g} %" for value in mismatch(fit).values()),
+            "Allan deviation differs from the model by": ", ".join(
+                f"{100 * value:.2g} % in {axis}" for axis, value in mismatch(fit).items()
+            ),
         }
 
     def facts(self, candidate: Candidate, diagnosis: Diagnosis[NoiseFit]) -> dict[str, str]:
