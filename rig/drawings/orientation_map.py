@@ -13,6 +13,7 @@ import numpy as np
 
 from calibrations.design.orientations import ORIENTATIONS, find_covered
 from calibrations.table import AXES, Array
+from calibrations.text import typeset
 from procedures.session import Guidance
 from rig.drawings import svg
 
@@ -54,11 +55,11 @@ SIDES = {"x": "#f6d5c6", "y": "#c6e5d9", "z": "#c9dff0"}
 
 def orientation_drawing(guidance: Guidance) -> str:
     """The sensor in the next orientation, and the halves of the sphere, as SVG."""
-    return svg.document(WIDTH, HEIGHT, guidance.text, _content(guidance))
+    return svg.document(WIDTH, HEIGHT, typeset(guidance.text), _content(guidance))
 
 
 def _content(guidance: Guidance) -> Iterator[str]:
-    action, _, progress = guidance.text.partition("; ")
+    action, _, progress = typeset(guidance.text).partition("; ")
     yield svg.text((16, 20), action, 16, anchor="start", bold=True)
     yield svg.text((16, 42), progress, 14, svg.QUIET, anchor="start")
     if guidance.moves:

@@ -357,6 +357,8 @@ def test_the_drawing_shows_the_next_orientation_and_both_halves() -> None:
     height = {name: float(y) for y, name in re.findall(r'y="([\d.]+)"[^>]*font-size="15.*?>(..)</text>', drawn)}
     assert len(height) == 3
     assert height["+x"] == min(height.values())  # the page counts downward
+    corner = orientation_drawing(replace(guidance, text="position 4: corner -x +y -z up, then let go"))
+    assert corner.count("corner −x +y −z up") == 2  # the title and the sentence
     ended = orientation_drawing(Guidance("12 positions taken", (1.0, 0.0, 0.0), (UP,), moves=False))
     assert "<polygon" not in ended
 
