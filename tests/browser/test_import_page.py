@@ -11,6 +11,8 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from rig.record import Record
+from rig.services.importing import open_file, units_for
+from rig.web.pages.import_file import _sample_text
 from rig.web.upload import MOST_BYTES, place_upload
 from tests.browser.conftest import Workbench
 from tests.calibrations.test_turn_logs import log as turn_log
@@ -132,7 +134,7 @@ def test_what_a_person_chooses_has_the_unit_of_the_header_and_the_question_about
     expect(question).to_contain_text("It fits min.")
     expect(page.get_by_role("button", name="Import", exact=True)).to_be_disabled()
     choose(page, "unit of Kanal A / mV", "V")
-    expect(page.get_by_text("1500.08 to 3499.95 V")).to_be_visible()  # what is shown is what is used
+    expect(page.get_by_text("1500.1 to 3500 V")).to_be_visible()  # what is shown is what is used
 
 
 def test_a_file_that_needs_names_leads_from_the_model_page(workbench: Workbench, tmp_path: Path) -> None:
@@ -229,3 +231,14 @@ def test_an_import_can_be_cancelled(workbench: Workbench, tmp_path: Path) -> Non
     expect(page.get_by_text("1 row of poses")).to_be_visible()
     page.get_by_role("button", name="Cancel").click()
     page.wait_for_url("**/record")
+
+
+def test_a_column_shows_the_range_of_its_first_rows_as_such(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("ax,ay,az\n" + "".join(f"{2.5 + 1e-4 * k:.4f},0.5,1.5\n" for k in range(20_000)))
+    sheet = open_file(path)
+    rows = len(sheet.sample)
+    assert rows < 20_000
+    assert _sample_text(sheet, "ax").startswith("2.5, 2.5001, 2.5002 … (first ")
+    assert f"(first {rows} rows: 2.5 to " in _sample_text(sheet, "ax")
+    assert {"V", "mV"} <= set(units_for("ax"))
