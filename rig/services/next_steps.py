@@ -49,6 +49,9 @@ REMEDIES = {
     r"": "look for poses that differ from the others: rig show {run} --poses; rig exclude leaves one out, with "
     "a reason",
 }
+NOISE_ALONE = (
+    "These uncertainties include the noise alone, for the control chart; those of a fitted model include its error too"
+)
 LENGTHS = ("duration_s", "times", "cycles", "most_rounds", "dwell_s")  # settings by which a procedure measures longer
 LONGER = 4  # times as long halves a statistical uncertainty
 
@@ -61,6 +64,7 @@ def next_steps(run: Run, excluded: Mapping[int, str]) -> list[str]:
 def _advice(run: Run, excluded: Mapping[int, str], name_text: Callable[[str], str]) -> list[str]:
     """The steps that concern the measurement itself. `name_text` writes the name of a result."""
     return [
+        *([NOISE_ALONE] if run.procedure == "check-standard" and run.results else []),
         *_advise_on_excluded(excluded),
         *_advise_on_failures(run, name_text),
         *_marginal(run, name_text),

@@ -44,6 +44,14 @@ def test_each_verdict_has_its_steps(golden, results: dict[str, Any]) -> None:
     golden.same(steps(**results))
 
 
+@pytest.mark.parametrize(("procedure", "said"), [("check-standard", True), ("sweep", False)])
+def test_uncertainties_of_the_noise_alone_are_called_so(procedure: str, said: bool) -> None:
+    run = replace(RUN, procedure=procedure, results={"bias-x": result(None, None)})
+    assert ("noise alone" in "\n".join(next_steps(run, {}))) == said
+    assert any("noise alone" in step.text for step in page_steps(run, {})) == said
+    assert "noise alone" not in "\n".join(next_steps(replace(run, results={}), {}))
+
+
 @pytest.mark.parametrize(
     ("settings", "hint"),
     [
