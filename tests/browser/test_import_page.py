@@ -39,6 +39,7 @@ def foreign(folder: Path, clock: str = "Takt") -> Path:
 def choose(page: Page, field: str, value: str) -> None:
     page.get_by_label(field, exact=True).click()
     page.get_by_role("option", name=value, exact=True).click()
+    expect(page.get_by_role("option")).to_have_count(0)  # the list has closed
 
 
 def test_a_log_of_a_gyroscope_with_an_accelerometer_is_imported_as_turns(workbench: Workbench, tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -150,16 +150,20 @@ def as_nobody(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.fixture
-def read_only(rig_home: Path) -> Any:
-    """A record with a run, in a folder that may not be written."""
-    with Record() as record:
-        run = swept(record, lambda: None).run.run
-    rig_home.chmod(0o555)
-    for parent in rig_home.parents:
-        if Path(tempfile.gettempdir()) in parent.parents:
-            parent.chmod(0o755)
-    yield run
-    rig_home.chmod(0o755)
+def read_only(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """A record with a run, in a folder that may not be written.
+
+    It is no folder of pytest: each start of pytest closes those to other users.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        home = Path(folder) / "home"
+        monkeypatch.setenv("RIG_HOME", str(home))
+        with Record() as record:
+            run = swept(record, lambda: None).run.run
+        home.chmod(0o555)
+        home.parent.chmod(0o755)
+        yield run
+        home.chmod(0o755)
 
 
 @pytest.mark.slow
