@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import sys
 from collections.abc import Callable
+from io import StringIO
+from typing import TextIO
 
 import pexpect
 import pytest
+from rich.console import Console
 
+from rig.cli.terminal.guide import LinePrompt
 from rig.record import Record, Run
 from rig.runs.observer import NEXT_STEP
 from rig.runs.runner import REPEATED
@@ -143,3 +148,21 @@ def test_sigterm_ends_a_guided_run_without_a_menu() -> None:
         assert NEXT_STEP.text not in (terminal.before or "")
     assert terminal.exitstatus == 4
     assert only_run()[0].state == "stopped"
+
+
+def test_a_question_reads_the_terminal_only_when_a_line_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A signal just before a read that blocks would wait for the next line."""
+    person, terminal = os.openpty()
+    waits: list[float] = []
+
+    def nobody_typed_twice(files: list[TextIO], _write: object, _error: object, wait_s: float) -> list[list[TextIO]]:
+        waits.append(wait_s)
+        return [files if len(waits) > 2 else [], [], []]
+
+    monkeypatch.setattr("select.select", nobody_typed_twice)
+    monkeypatch.setattr("builtins.input", lambda: f"after {len(waits)} waits")
+    with os.fdopen(person, "rb", 0), os.fdopen(terminal) as stdin:
+        monkeypatch.setattr("sys.stdin", stdin)
+        answer = LinePrompt.ask("Begin?", console=Console(file=StringIO()))
+    assert answer == "after 3 waits"
+    assert max(waits) <= 0.2
