@@ -144,7 +144,8 @@ def test_a_run_of_a_batch_is_a_calibration_of_each_sensor(rig: Rig, bench_file: 
 
 def test_a_run_leads_to_the_life_of_its_sensor(rig: Rig, years: None) -> None:
     shown = {run["run"]: rig("show", run["run"]).out for run in rig("runs", "--json").document["runs"]}
-    assert sum("The record has 5 runs of the sensor 17: rig history 17" in text for text in shown.values()) == 5
+    said = "The record has 5 calibration runs of the sensor 17: rig history 17"
+    assert sum(said in text for text in shown.values()) == 5
     assert sum("rig history 18" in text for text in shown.values()) == 0  # one run makes no life
 
 

@@ -50,7 +50,7 @@ def show_command(run: str, poses: bool, wants_log: bool, as_json: bool) -> None:
     else:
         result_lines = [*results_table(run_row.results), *next_steps(run_row, left_out)]
         result_lines += [
-            f"The record has {count} runs of the sensor {name}: rig history {name}"
+            f"The record has {count} calibration runs of the sensor {name}: rig history {name}"
             for name, count in run_counts.items()
         ]
         parts = (

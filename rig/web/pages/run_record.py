@@ -245,7 +245,7 @@ class OneRun:
                     for sensor, count in run_counts.items():
                         address = HistoryRequest(sensor).address
                         named = " ".join(filter(None, (type_of(sensor, run), sensor)))
-                        ui.link(f"{count} runs of the sensor {named}: history", address).classes("small")
+                        ui.link(f"{count} calibration runs of the sensor {named}: history", address).classes("small")
                 with box("stack"):
                     words("Settings", "title")
                     for part in _circumstances(run):
