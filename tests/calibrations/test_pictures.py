@@ -9,30 +9,22 @@ from functools import cache
 
 import numpy as np
 import pytest
-from matplotlib.text import Annotation
 
 from calibrations.analyses.hand_turns import fit_turns
 from calibrations.discovery.findings import Step
 from calibrations.discovery.results import Discovery
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit, fit, pool_in_milli
-from calibrations.loop import compare, discover
+from calibrations.loop import discover
 from calibrations.model import Model
 from calibrations.model.file import read_model
 from calibrations.noise.comparison import DeviationComparison
-from calibrations.presentation.chart import Bars, Chart, Line, Panel, Points, Second, single_chart
+from calibrations.presentation.chart import Chart, Line, Panel, Points, Second, single_chart
 from calibrations.presentation.charts import contribution
 from calibrations.presentation.charts import fit as charts
 from calibrations.presentation.charts.discovery import (
-    MOST_CURVES,
-    Level,
-    album,
-    brief,
     effect_chart,
-    levels,
-    notable_steps,
     steps_album,
-    waterfall,
 )
 from calibrations.presentation.charts.noise import ratio
 from calibrations.presentation.interactive import figure
@@ -250,25 +242,6 @@ def test_the_line_of_the_model_is_broken_where_poses_are_excluded() -> None:
         assert np.count_nonzero(np.isnan(line.x)) == stretches + breaks
 
 
-def test_texts_of_many_bars_are_short() -> None:
-    steps = [Level(f"+ {k}", 10.0 - k, 11.0 - k, "3.8 mg") for k in range(9)]
-    for count, text in ((8, "10.0 × (3.8 mg)"), (9, "10.0 ×")):
-        (bars,) = [bars for bars in panels(waterfall(steps[:count]))[0].series if isinstance(bars, Bars)]
-        assert bars.texts[0] == text
-
-
-def test_an_error_far_below_the_noise_floor_has_a_bar() -> None:
-    (panel,) = panels(waterfall([Level("linear", 9.0, 9.5, "9 mg"), Level("+ a", 0.3, 0.2, "0.1 mg")]))
-    bars = next(series for series in panel.series if isinstance(series, Bars))
-    assert panel.x.low is not None
-    assert bars.base == panel.x.low < 0.3
-
-
-def test_texts_of_bars_keep_their_size() -> None:
-    (trace,) = [trace for trace in figure(waterfall(levels(warm())), "k")["data"] if trace["type"] == "bar"]
-    assert trace["constraintext"] == "none"
-
-
 def test_the_map_of_positions_is_of_equal_area() -> None:
     (panel,) = panels(charts.failure_chart(by_hand().start))
     shown = dots(panel)
@@ -345,37 +318,6 @@ def test_a_function_of_a_column_is_explained_by_it_and_noise_is_not() -> None:
     assert contribution.explained_share(0 * x, x, sides) == 0
 
 
-def test_the_waterfall_falls_from_level_to_level() -> None:
-    found = warm()
-    (panel,) = panels(waterfall(levels(found)))
-    bars = next(series for series in panel.series if isinstance(series, Bars))
-    assert bars.ends.tolist() == [found.start.pooled_excess, found.end.pooled_excess]
-    assert dots(panel).x.tolist() == [levels(found)[0].unseen, found.steps[0].held_out_after]
-    assert panel.y.names == ("linear", "+ temperature-bias")
-    assert bars.texts[0].endswith(f"× ({pool_in_milli(found.start)[0]:.2f} mg)")
-
-
-def test_the_diamond_of_unseen_rows_covers_no_text_of_a_short_bar() -> None:
-    chart = waterfall(
-        [Level("linear", 90.0, 95.0, "9 mg"), Level("+ a", 1.0, 1.6, "0.1 mg"), Level("+ b", 1.2, 1.1, "0.1 mg")]
-    )
-    shown = figure(chart, "waterfall")
-    (bars,) = [trace for trace in shown["data"] if trace["type"] == "bar"]
-    assert [bool(text.strip()) for text in bars["text"]] == [True, False, False]
-    starts = [(note["text"].strip(), 10 ** note["x"], note["y"]) for note in shown["layout"]["annotations"]]
-    assert starts == [("1.00 × (0.1 mg)", pytest.approx(1.6), 1), ("1.20 × (0.1 mg)", pytest.approx(1.2), 2)]
-    printed = [
-        text for text in draw(chart).axes[0].texts if isinstance(text, Annotation) and "0.1 mg" in text.get_text()
-    ]
-    assert [text.xy for text in printed] == [(pytest.approx(1.6), 1), (pytest.approx(1.2), 2)]
-
-
-def test_the_name_of_a_model_with_many_effects_leaves_room_for_bars() -> None:
-    assert brief("linear+hysteresis") == "linear+hysteresis"
-    assert brief("linear+hysteresis+base-tilt+bias-drift") == "linear + 3 effects"
-    assert brief("linear+a+b+c+d+free:history") == "linear + 5 effects"
-
-
 def test_the_ratio_of_deviations_has_marks_on_both_sides_of_1() -> None:
     times, ones = np.array([1.0, 10.0, 100.0]), np.ones(3)
     curve = DeviationComparison(times, 1.1 * ones, 0.9 * ones, 1.4 * ones, ones, 10 * ones, ones)
@@ -388,26 +330,3 @@ def test_rms_in_mg_is_that_of_the_residual() -> None:
     error, floor = pool_in_milli(found)
     assert error == pytest.approx(1e3 * np.sqrt(np.mean(found.residual**2)))
     assert error / floor == pytest.approx(found.pooled_excess)
-
-
-def test_the_album_holds_every_picture_once() -> None:
-    pictures = album(warm(), compare(warm_table(), read_model("linear")))
-    names = [picture.name for picture in pictures]
-    places = ["shares", "place-temperature-bias"]
-    assert names == ["waterfall", "measurement", "residual", "failure", "effect-temperature-bias", *places]
-    assert all(picture.title and picture.caption.endswith(".") for picture in pictures)
-
-
-def test_only_a_stage_turns_clockwise() -> None:
-    for found, is_turned in ((warm(), True), (by_hand(), False)):
-        captions = [picture.caption for picture in steps_album(found) if picture.name.startswith("effect-")]
-        assert captions
-        assert all(("clockwise" in caption) == is_turned for caption in captions)
-
-
-def test_only_the_greatest_falls_are_drawn() -> None:
-    (step,) = warm().steps
-    idle = [Step(f"e{k}", step.after, step.after) for k in range(MOST_CURVES)]
-    findings = replace(warm().findings, steps=(*idle[:2], step, *idle[2:]))
-    shown = notable_steps(Discovery.of(findings))
-    assert step in shown
