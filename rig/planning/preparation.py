@@ -24,16 +24,18 @@ def storage(plan: Plan, free_bytes: int) -> str:
 
 
 LONG_CABLE = "the sensor's cable is long enough to turn it upside down"
-HAND_CHECKS = (LONG_CABLE, "the table is firm, and no motor shakes it")
+FIRM_TABLE = "the table is firm, and no motor shakes it"
 
 
-def checks(plan: Plan, question: Confirm | None = None) -> list[str]:
-    """Checks that only a person can do, before anything moves; none that `question` beside them asks as well."""
+def checks(plan: Plan, is_resumed: bool = False) -> list[str]:
+    """Checks that only a person can do, before anything moves.
+
+    The first question of a procedure with the sensor in a hand is about its cable; a resumed run does not ask again.
+    """
     actions = [step.what for step in plan.steps]
     level = any("level" in question.name for question in plan.asked)
     if not plan.reach:
-        is_asked = question is not None and "cable long enough" in question.text
-        return [line for line in HAND_CHECKS if line != LONG_CABLE or not is_asked]
+        return [LONG_CABLE, FIRM_TABLE] if is_resumed else [FIRM_TABLE]
     lines = [
         "the cables are long enough for the whole range, and no object or person is in the way of the stages",
         "the sensor is fastened as in the drawing, with pin 1 at the drawn place",

@@ -13,12 +13,12 @@ from calibrations.text import as_written, count_words
 from drivers.recorder import Samples
 from procedures.session import Dwell, Pose
 
-TURNS = ("turn or rest", "turns and rests")
-UNITS = {  # what the rows of a run are, by its kind
+TURNS_AND_RESTS = ("turn or rest", "turns and rests")
+ROW_WORDS = {  # of one and of many rows of a run, by its kind
     "poses": ("pose", "poses"),
     "positions": ("position", "positions"),
-    "rates": TURNS,
-    "turns": TURNS,
+    "rates": TURNS_AND_RESTS,
+    "turns": TURNS_AND_RESTS,
 }
 
 
@@ -81,7 +81,7 @@ class Run:
             return count_words(self.rows, "row", "rows")
         if not self.rows:
             return "no poses"
-        singular, plural = UNITS.get(self.kind, ("pose or block", "poses and blocks"))
+        singular, plural = ROW_WORDS.get(self.kind, ("pose or block", "poses and blocks"))
         return count_words(self.rows, singular, plural)
 
 

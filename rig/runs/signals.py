@@ -123,17 +123,21 @@ class _Interrupter:
 
 def _indivisible(frame: FrameType | None) -> bool:
     """Whether an exception here would break the interrupted code."""
-    while frame is not None:
-        module = str(frame.f_globals.get("__name__"))
-        function = (module, frame.f_code.co_name)
-        if function in QUESTIONS:
+    for module, function in callers(frame):
+        if (module, function) in QUESTIONS:
             return False
-        if function in (*COUNTERS, *FLEET_STARTS):
+        if (module, function) in (*COUNTERS, *FLEET_STARTS):
             return True
         if module.startswith(COMPILED_PACKAGE) or module.partition(".")[0] == SCREEN:
             return True
-        frame = frame.f_back
     return False
+
+
+def callers(frame: FrameType | None) -> Iterator[tuple[str, str]]:
+    """The module and the name of the function of a frame, then those of its caller, and so on."""
+    while frame is not None:
+        yield str(frame.f_globals.get("__name__")), frame.f_code.co_name
+        frame = frame.f_back
 
 
 SHOWN_BYTES = 64  # of one message: of a stream packet, the header and the first samples

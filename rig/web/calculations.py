@@ -12,7 +12,6 @@ from contextvars import copy_context
 from dataclasses import dataclass
 from functools import partial
 from threading import Event, Thread
-from types import FrameType
 from typing import Any, Generic, ParamSpec, TypeVar
 from weakref import WeakSet
 
@@ -20,12 +19,14 @@ from nicegui import ui
 
 from calibrations.effects import Effect
 from calibrations.progress import show_progress
+from rig.runs.signals import callers
 from rig.services.search import Cancelled, CountedEffects
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
-INDIVISIBLE = ("numba", "llvmlite", "importlib")  # the compiler and the import of modules
+# The compiler and the import of modules: an exception there would leave a lock locked for ever, or be discarded.
+INDIVISIBLE = {"numba", "llvmlite", "importlib"}
 LATER_S = 0.01
 
 
@@ -104,7 +105,8 @@ class Calculation(Generic[R]):
         number = self.thread.ident
         if self.future.done() or number is None:
             return True
-        if _is_indivisible(sys._current_frames().get(number)):
+        modules = {module.partition(".")[0] for module, _ in callers(sys._current_frames().get(number))}
+        if not modules.isdisjoint(INDIVISIBLE):
             return False
         ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(number), ctypes.py_object(Cancelled))
         return True
@@ -112,15 +114,6 @@ class Calculation(Generic[R]):
     def _interrupt_later(self) -> None:
         while not self._interrupt():
             wait([self.future], LATER_S)
-
-
-def _is_indivisible(frame: FrameType | None) -> bool:
-    """Whether an exception would leave a lock locked for ever, or be discarded."""
-    while frame is not None:
-        if str(frame.f_globals.get("__name__")).partition(".")[0] in INDIVISIBLE:
-            return True
-        frame = frame.f_back
-    return False
 
 
 def begin(call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> Calculation[R]:

@@ -389,5 +389,7 @@ def test_without_stages_the_checks_are_those_of_a_hand() -> None:
     planned = plan(read_bench(HAND), procedure, parse(procedure, {}))
     assert planned.poses >= 12
     assert 60 < planned.duration_s < 300
-    assert any("upside down" in line for line in checks(planned))
-    assert not any("stages" in line for line in checks(planned))
+    assert any("upside down" in question.text for question in planned.asked)
+    assert not any("upside down" in line for line in checks(planned))  # asked once
+    assert any("upside down" in line for line in checks(planned, is_resumed=True))
+    assert not any("stages" in line for line in checks(planned, is_resumed=True))

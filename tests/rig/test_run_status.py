@@ -22,7 +22,7 @@ from rig.runs.background import status as status_file
 from rig.runs.background.process import Attendant
 from rig.runs.background.status import KEPT_ESTIMATES, Order, Status, file, folder, keys, lock, read, remove_old_files
 from rig.runs.runner import Outcome, start
-from rig.web.pages.run_live import count_words, stop_words
+from rig.web.pages.run_live import progress_words, stop_words
 from tests.rig.rigging import POSES, SMALL
 
 KEY = "20261121-093012"
@@ -129,7 +129,7 @@ def test_a_run_that_reaches_its_target_early_is_whole() -> None:
     last = read(KEY)
     assert last is not None
     assert (last.done, last.total) == (23, 23)
-    assert count_words(last) == "23 turns and rests"
+    assert progress_words(last) == "23 turns and rests"
 
 
 @pytest.mark.parametrize("retried", [False, True])

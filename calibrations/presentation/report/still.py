@@ -126,8 +126,6 @@ def _summary(discovery: Discovery[NoiseFit]) -> str:
             f"{rounded(start.pooled_excess)} to {rounded(end.pooled_excess)} times the scatter by chance, and that of "
             f"the Allan deviation from {_mismatch_text(start)} to {_mismatch_text(end)}."
         )
-    elif "Remaining error" not in discovery.judgement.text:  # that is the same ratio
-        text += f"The mismatch of the spectrum is {rounded(discovery.start.pooled_excess)} times the scatter by chance."
     return f"{text} {typeset(discovery.judgement.text)}"
 
 

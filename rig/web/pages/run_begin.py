@@ -32,7 +32,7 @@ class Preparation:
 def before_start(plan: Plan, bench: Bench) -> Preparation:
     """The preparation of a new run. The sensors of a batch keep the names of the bench file."""
     question = first_question(plan)
-    by_hand = [for_page(capital(line)) for line in checks(plan, question)]
+    by_hand = [for_page(capital(line)) for line in checks(plan)]
     sensor = None if bench.sensors else {"name": bench.sensor.name, "serial": bench.sensor.serial}
     batch = {"Sensors": ", ".join(bench.sensors)} if bench.sensors else {}
     return Preparation(
@@ -61,7 +61,7 @@ def before_resume(run: Run, plan: Plan, bench: Bench, attitude: Attitude | None)
     return Preparation(
         f"Resume {run.procedure} {run.run}",
         head | rows,
-        [for_page(capital(line)) for line in checks(plan)],
+        [for_page(capital(line)) for line in checks(plan, is_resumed=True)],
         attitude if plan.reach else None,
     )
 

@@ -165,7 +165,7 @@ class Live:
         self.share.set_text(f"{100 * status.done // status.total} %" if status.total else "")
         self.bar.set_value(status.done / status.total if status.total else 0.0)
         self.bar.set_visibility(active or bool(status.total))
-        self.count.set_text(count_words(status))
+        self.count.set_text(progress_words(status))
         self._links(status)
         paused = status.phase == "paused" and status.seat == "page"
         self.pause.set_visibility(status.phase == "running" and status.seat != "nobody")
@@ -289,7 +289,7 @@ def _tile(value: Mapping[str, Any]) -> None:
         words(value["near"] or for_page(value["remark"]), "small")
 
 
-def count_words(status: Status) -> str:
+def progress_words(status: Status) -> str:
     """How many poses there are, and how long the rest takes; of a complete run its measurements."""
     poses = f"{status.done} of {status.total} poses" if status.total else ""
     return "; ".join(filter(None, (status.extent or poses, status.left if status.phase != "ended" else "")))
