@@ -102,6 +102,16 @@ def test_what_is_of_two_kinds_is_not_compared_and_why(workbench: Workbench, runs
     expect(page.locator("[aria-label^='Allan deviation of both'] .points path").first).to_be_attached()
 
 
+# Whether a table or a box around it is wider than its place.
+CUT = """table => {
+    let isCut = false;
+    for (let box = table; box; box = box.parentElement) {
+        isCut ||= box.scrollWidth > Math.min(box.clientWidth, innerWidth);
+    }
+    return isCut;
+}"""
+
+
 @pytest.mark.slow
 def test_a_run_is_exported_and_reported(workbench: Workbench, runs: list[str], tmp_path: Path) -> None:
     page = workbench.visit(f"/record/{runs[0]}")
@@ -111,7 +121,14 @@ def test_a_run_is_exported_and_reported(workbench: Workbench, runs: list[str], t
     assert read_csv(tmp_path / "exported.csv").n == 518
     with page.expect_download() as report:
         page.get_by_role("button", name="Report").click()
-    assert "misses axis-misalignment" in Path(report.value.path()).read_text(encoding="utf-8")
+    text = Path(report.value.path()).read_text(encoding="utf-8")
+    assert "misses axis-misalignment" in text
+    printed = workbench.context.new_page()
+    printed.set_viewport_size({"width": 1440, "height": 900})
+    printed.set_content(text)
+    budget = printed.get_by_role("table").filter(has_text="coverage factor")
+    expect(budget.get_by_text("expanded uncertainty")).to_be_visible()
+    assert budget.evaluate(CUT) is False
 
 
 @pytest.mark.slow

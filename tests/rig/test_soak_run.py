@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 import yaml
 
+from calibrations import discover
 from calibrations.analyses.forecast import Bounds, Forecast, SoakForecast
 from procedures.catalogue import find
 from procedures.soak import schedule
+from rig import load
 from rig.bench import DEFAULT, read_bench
 from rig.bench.result_names import names_with_limits
 from rig.record import Record
@@ -207,3 +209,15 @@ def test_the_plan_of_a_night_is_quick_and_whole(rig: Rig) -> None:
 def test_a_switch_may_have_a_value_too(rig: Rig) -> None:
     assert rig("plan", "soak", "--until-steady", "no", "--json").document["settings"]["until_steady"] is False
     assert "true or false" in rig("plan", "soak", "--until-steady", "maybe").err
+
+
+@pytest.mark.release
+def test_a_search_on_a_soak_publishes_no_scale_factor_that_its_orientations_do_not_show(rig: Rig) -> None:
+    """A scale factor of 1.1356(21) V/g, where the sensor's is 0.985, had companions that were not identified."""
+    rig("run", "soak", "--duration-s", "7200", "--interval-s", "900", "--unattended")
+    found = discover(load("last"), "linear")
+    scales = [estimate for key, estimate in found.end.params.items() if key.startswith("scale-factor.")]
+    assert len(scales) == 2
+    for scale in scales:
+        assert scale.std is not None
+        assert not scale.identified or abs(scale.value - 1.0) < 0.02 + 3 * scale.std
