@@ -98,6 +98,7 @@ class _Interrupter:
         for signal_number in SIGNALS:
             signal.signal(signal_number, signal.SIG_IGN)
         self._delayed = None  # an earlier one that waits is the same stop: raised again, it would interrupt the stop
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
         self._raised = number
         self.fired.append(number)
         raise KeyboardInterrupt(signal.Signals(number).name)
@@ -118,7 +119,9 @@ class _Interrupter:
 
     def _delay(self, number: int) -> None:
         self._delayed = number
-        signal.setitimer(signal.ITIMER_REAL, AGAIN_S)  # not a thread: the interrupted code may hold its locks
+        # No thread: the interrupted code may hold its locks. The timer repeats: a wait that begins just after one of its
+        # signals hears the next one.
+        signal.setitimer(signal.ITIMER_REAL, AGAIN_S, AGAIN_S)
 
 
 def _indivisible(frame: FrameType | None) -> bool:

@@ -141,6 +141,27 @@ def test_a_computing_world_and_a_screen_half_written_are_not_interrupted(module:
     assert signalled_in(module, name) == ["whole"]
 
 
+def test_a_delayed_signal_is_repeated_until_it_is_heard() -> None:
+    """A wait that begins between a signal of the timer and its handler would hear none otherwise."""
+    repeated_s: list[float] = []
+
+    def take() -> None:
+        signal.raise_signal(signal.SIGINT)
+        repeated_s.append(signal.getitimer(signal.ITIMER_REAL)[1])
+
+    namespace = {"signal": signal, "__name__": "drivers.transport.link"}
+    take_bytes = FunctionType(take.__code__, namespace, closure=take.__closure__)
+
+    def take_and_wait() -> None:
+        take_bytes()
+        Event().wait(30)  # the signal ends it
+
+    with pytest.raises(KeyboardInterrupt, match="SIGINT"), stoppable():
+        take_and_wait()
+    assert 0 < repeated_s[0] < 0.1
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
 @pytest.mark.parametrize(("module", "name"), [*QUESTIONS, ("richer", "print"), ("rig.runs.runner", "run")])
 def test_every_wait_for_a_person_can_be_stopped(module: str, name: str) -> None:
     assert signalled_in(module, name) == []
