@@ -119,8 +119,8 @@ class _Interrupter:
 
     def _delay(self, number: int) -> None:
         self._delayed = number
-        # No thread: the interrupted code may hold its locks. The timer repeats: a wait that begins just after one of its
-        # signals hears the next one.
+        # No thread: the interrupted code may hold its locks. The timer repeats: a wait that begins just after one
+        # signal hears the next one.
         signal.setitimer(signal.ITIMER_REAL, AGAIN_S, AGAIN_S)
 
 
