@@ -61,6 +61,7 @@ FEWEST_CHECKS = 3  # check poses, and repeats: fewer estimate no noise
 NOT_SHOWN = 1e-2  # of a column's length: if less of it is independent of the model, the data cannot show the effect
 WRONG_FLOOR = 0.5  # error over the stated noise floor: white noise alone leaves no less, so that the floor is wrong
 FEWEST_FOR_FLOOR = 20  # rows: fewer can be so near to a model by chance
+FEWEST_VISITS = 4  # of each pose: from there on rows do not show what a model predicts between the poses
 FEWEST_FREE_ROWS = 2  # rows beyond the parameters of the widest form: fewer do not estimate their scatter
 
 # Next experiment

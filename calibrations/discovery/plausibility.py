@@ -44,6 +44,7 @@ from calibrations.criteria import (
 from calibrations.discovery.readings import Response, geometry_finding, response
 from calibrations.discovery.verdict import Finding, Verdict
 from calibrations.fitting.fit import Fit
+from calibrations.fitting.solution import pose_numbers, repeats_few_poses
 from calibrations.geometry.orientation import reported_force
 from calibrations.geometry.rate_table import turn_axes
 from calibrations.means.noise import rms, white_std
@@ -325,7 +326,7 @@ def _variance_within_clusters(clusters: tuple[NDArray[np.bool_], float, Array]) 
 
 
 def _has_pattern(table: Table, labels: NDArray[np.bool_]) -> bool:
-    """Whether the groups depend on time, direction, path or angle: then they are an effect of the sensor or rig."""
+    """Whether the groups depend on time, direction, path, angle or pose: then an effect of sensor or rig made them."""
     share = float(labels.mean())
     by_chance = share**2 + (1 - share) ** 2  # neighbours in one group, where the groups are mixed at random
     orders = [np.arange(table.n)]
@@ -343,6 +344,8 @@ def _has_pattern(table: Table, labels: NDArray[np.bool_]) -> bool:
     if _exceeds_chance(along, by_chance):
         return True
     kinds = [table.column(name) for name in ("direction", "flip", "mount_deg") if name in table]
+    if (pose := pose_numbers(table)) is not None and repeats_few_poses(table):
+        kinds.append(pose.astype(float))  # two sensors measure the same poses, so that each pose has both
     return any(
         _exceeds_chance(
             sum(max(labels[values == value].sum(), (~labels[values == value]).sum()) for value in np.unique(values))

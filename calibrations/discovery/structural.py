@@ -286,7 +286,7 @@ def _with_renewed_forms(base: Fit, found: _StructureFit, effects: Mapping[str, E
     given = any(a.effect.name not in BASE for a in found.causes)
     if not given or reached or end.problem.rounds or end.held_out_excess <= MATERIAL:
         return found
-    places_beside = structure(causes_alone(end, found.forms), effects)
+    places_beside = structure(causes_alone(end, found.forms), effects, places)
     refined = fit_separately(base, places_beside, additions(places_beside, end.model, effects))
     causes, forms = at_values_of(end, found.causes), [*refined, *free_additions(places_beside, base.model)]
     renewed = replace(found, causes=causes, forms=forms, end=fit_together(base, [*causes, *forms]))
@@ -354,10 +354,12 @@ def _first(start: Fit, steps: list[Step[Fit]], ranked: Sequence[RowCandidate]) -
     return first_effect, *other_candidates
 
 
-def structure(start: Fit, effects: Mapping[str, Effect]) -> Structure:
-    """The places that act beyond the model of `start`."""
+def structure(start: Fit, effects: Mapping[str, Effect], before: Structure | None = None) -> Structure:
+    """The places that act beyond the model of `start`, in the noise that an earlier structure found in its residual."""
+    of_residual = before is not None and before.floor_source is not FloorSource.SAMPLES
+    white = before.white if before is not None and of_residual else start.problem.white
     geometry = _geometry_effects(start, effects)
-    return find_structure(start.table, start.problem.white, effects_beyond_base(start), geometry)
+    return find_structure(start.table, white, effects_beyond_base(start), geometry, of_residual)
 
 
 def residual_beside_places(start: Fit) -> float:

@@ -33,6 +33,7 @@ from calibrations.discovery.significance import Screen, Search, of_search
 from calibrations.discovery.verdict import Finding, Verdict
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.noise_fit import gains
+from calibrations.fitting.solution import repeats_few_poses
 from calibrations.means.noise import correlation_known, most_scatter, rms, robust_std
 from calibrations.table import Array
 
@@ -184,20 +185,23 @@ def poorly_predicted(fit: Fit) -> Pattern | None:
     """The error on unseen stretches of a motion, or on unseen poses, where the model follows the rows of its fit alone.
 
     Effects can fit each of a few stretches alone. Of poses, the generalised cross-validation has to show it as well: a
-    large error on unseen poses may be that of one pose, which alone determines a parameter.
+    large error on unseen poses may be that of one pose, which alone determines a parameter. Where a few poses were
+    visited many times, this cross-validation over rows leaves out no pose.
     """
     seen = max(fit.pooled_excess, 1.0)
     if fit.table.type.moving and fit.held_out_excess > MOST_UNSEEN:
         rows = "stretches"
     elif (
         fit.table.type.stage_angles
-        and fit.cross_validated_excess > MATERIAL * seen
         and fit.held_out_excess > MOST_UNSEEN * seen
+        and (fit.cross_validated_excess > MATERIAL * seen or repeats_few_poses(fit.table))
     ):
         rows = "poses"
     else:
         return None
-    text = f"the error on unseen {rows} is {fit.held_out_excess:.2g} times the noise floor"
+    few = rows == "poses" and repeats_few_poses(fit.table)
+    advice = "; these rows are at few poses: measure at more orientations" if few else ""
+    text = f"the error on unseen {rows} is {fit.held_out_excess:.2g} times the noise floor{advice}"
     return Pattern(text, np.zeros((0, 0, 0)))
 
 

@@ -25,7 +25,7 @@ from calibrations.free_forms.form import Factor, Form
 from calibrations.free_forms.geometry import GEOMETRY, Geometry
 from calibrations.free_forms.places import components
 from calibrations.free_forms.poses import PoseData
-from calibrations.free_forms.reml import coefficients, estimate, gains, gram, scale_components
+from calibrations.free_forms.reml import coefficients, estimate, gains, scale_components
 from calibrations.free_forms.requested import RequestedForm
 from calibrations.free_forms.selection import ENTER, select
 from calibrations.free_forms.structure import FloorSource, Structure
@@ -148,8 +148,7 @@ def _size_forms(
     for number in range(ROUNDS):
         X, g = setting.linearise(point, scales)
         if number == 0:
-            X, scales = scale_components(X, g, setting.base_size)
-            g = gram(X, g.blocks, scales, setting.base_size)
+            X, g = scale_components(X, g)
         scales = g.scales
         sizes = select(g, estimate(g, point.variances, limits), point.components, [by_name], limits, ENTER, number > 0)
         if not any(name in sizes.variances for name in by_name) and len(sizes.variances) == len(noise):

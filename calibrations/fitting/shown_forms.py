@@ -73,9 +73,8 @@ class Shown:
         blocks = {name: slice(int(a), int(b)) for name, a, b in zip(parts, ends[:-1], ends[1:], strict=True)}
         left = fit.whitened[:, 0] - J[:, own] @ fit.theta[own]
         X = np.hstack([J[:, ~own], *parts.values(), left[:, None]]) / scatter
-        g = _gram(fit, X, ~own, blocks, dict.fromkeys(blocks, 1.0))
-        X, scales = scale_components(X, g, int(np.sum(~own)))
-        return Shown(fit, forms, _gram(fit, X, ~own, blocks, scales), X, apart, scatter)
+        X, g = scale_components(X, _gram(fit, X, ~own, blocks))
+        return Shown(fit, forms, g, X, apart, scatter)
 
     @cached_property
     def components(self) -> Mapping[str, Component]:
@@ -174,16 +173,14 @@ def _component(name: str, form: Form) -> Component:
     return Component(name, form.place, "response", price=price, form=form)
 
 
-def _gram(
-    fit: Solution, X: Array, base: NDArray[np.bool_], blocks: Mapping[str, slice], scales: Mapping[str, float]
-) -> Gram:
+def _gram(fit: Solution, X: Array, base: NDArray[np.bool_], blocks: Mapping[str, slice]) -> Gram:
     """Products of the columns, with the priors of the model's own free forms; `base`: those of the first columns."""
     b, rows = int(base.sum()), fit.problem.layout.prior_rows[:, base]
     products = X.T @ X
     products[:b, :b] += rows.T @ rows
     products[:b, -1] += rows.T @ (rows @ fit.theta[base])
     products[-1, :b] = products[:b, -1]
-    return eliminate_base(products, blocks, scales, b, len(X))
+    return eliminate_base(products, blocks, dict.fromkeys(blocks, 1.0), b, len(X))
 
 
 def _forms(place: str, table: Table, force: Array) -> Sequence[Form]:

@@ -13,6 +13,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrations.criteria import FEWEST_VISITS
 from calibrations.fitting.problem import Problem
 from calibrations.geometry.orientation import one_orientation
 from calibrations.means.noise import Noise, rms, white_only
@@ -161,14 +162,27 @@ def white_noise(problem: Problem) -> Noise:
 
 def folds(table: Table) -> NDArray[np.intp]:
     """Fold number of each row, shape (n,); rows at the same angles share one, unless all rows do."""
-    names = [name for name in table.type.same_pose if name in table]
-    if not names or one_orientation(table):
+    pose = pose_numbers(table)
+    if pose is None or one_orientation(table):
         return np.random.default_rng(0).permutation(table.n) % min(table.n, MOST_FOLDS)
+    poses = int(pose.max()) + 1
+    number = np.random.default_rng(0).permutation(poses) % min(poses, FOLDS)
+    return np.asarray(number[pose])
+
+
+def pose_numbers(table: Table) -> NDArray[np.intp] | None:
+    """The number of the pose at which each row was measured, (n,); None for tables without angles."""
+    names = [name for name in table.type.same_pose if name in table]
+    if not names:
+        return None
     keys = np.column_stack([np.round(table.column(name), 6) for name in names])
-    _, group = np.unique(keys, axis=0, return_inverse=True)
-    groups = int(group.max()) + 1
-    number = np.random.default_rng(0).permutation(groups) % min(groups, FOLDS)
-    return np.asarray(number[group.ravel()])
+    return np.asarray(np.unique(keys, axis=0, return_inverse=True)[1].ravel())
+
+
+def repeats_few_poses(table: Table) -> bool:
+    """Whether the rows are at few poses, each of which was visited many times."""
+    pose = pose_numbers(table)
+    return pose is not None and len(pose) >= FEWEST_VISITS * (int(pose.max()) + 1)
 
 
 def held_out(

@@ -30,6 +30,7 @@ from calibrations.free_forms.reml import (
 from calibrations.free_forms.selection import ENTER, pools_of, prices, select
 from calibrations.free_forms.shapes import refine_shapes
 from calibrations.free_forms.stairs import find_saw
+from calibrations.means.noise import rms
 from calibrations.progress import report
 from calibrations.table import Array
 
@@ -42,6 +43,8 @@ HALVINGS = 6  # of a step that overshoots
 SLOW_BEGIN = 0.1  # slow noise, in noise floors (rms): where its estimate starts
 SLOW_FIRST = 0.15  # the most slow noise while the first components are found: more would explain a part of them
 SLOW_MOST = 0.5  # at most
+MOST_SLOW = 1.0  # noise floors (rms) that such slow noise takes up: more is something that moves with time
+NOISE_ALONE = 1.04  # residual over noise, up to which it is noise
 JUMP_TRIALS = 2  # of steps over the output, in one descent
 MISFIT = 1.08  # mean square of the residual over the noise: from there on steps over the output are tried
 CAUTION = 30.0  # times the gain that a component needs after a step that failed
@@ -83,7 +86,7 @@ class Setting:
         X, blocks, all_scales = whiten(
             point.state, self.model_effects, point.values, point.components, scales, self.white
         )
-        return X, gram(X, blocks, all_scales, self.base_size)
+        return X, gram(X, blocks, all_scales, self.base_size, self.data.channels)
 
     @cached_property
     def first_jumps(self) -> Component | None:
@@ -95,8 +98,7 @@ class Setting:
             return None
         components = [c for c in all_components(self.data, state) if not c.general and not c.has_loops]
         X, g = self.linearise(Point(components, {}, values, state), {})
-        X, scales = scale_components(X, g, self.base_size)
-        g = gram(X, g.blocks, scales, self.base_size)
+        X, g = scale_components(X, g)
         sizes = estimate(g, {c.name: misfit * self.floor**2 for c in components}, {}, rounds=0)
         return find_jumps(state, self.white, X, g, sizes)
 
@@ -189,16 +191,27 @@ class SearchResult:
         fitted = self.columns[:, :b] @ base + self.columns[:, b + rows] @ self.sizes.coefficients
         return np.asarray(self.columns[:, -1] - fitted)
 
-    @property
-    def error(self) -> float:
-        """Rms of what all components but slow noise leave, in the output's unit."""
+    @cached_property
+    def slow(self) -> Array:
+        """What slow noise takes up, over the white noise, (channels * n,)."""
         b = self.setting.base_size
         slow = np.zeros(len(self.columns))
         for component in self.components:
             if component.noise and component.name in self.sizes.variances:
                 block = self.gram.blocks[component.name]
                 slow += self.columns[:, b + block.start : b + block.stop] @ self.sizes.of(self.gram, component.name)
-        return float(np.sqrt(np.mean(((self.residual + slow) * self.white.ravel()) ** 2)))
+        return slow
+
+    @property
+    def error(self) -> float:
+        """Rms of what all components but slow noise leave, in the output's unit."""
+        return float(np.sqrt(np.mean(((self.residual + self.slow) * self.white.ravel()) ** 2)))
+
+    @property
+    def leaves_noise(self) -> bool:
+        """Whether what the components leave is noise: white noise, and no more slow noise than there may be."""
+        slow = 0.0 if self.setting.flicker else float(rms(self.slow))
+        return self.ratio < NOISE_ALONE and slow < MOST_SLOW
 
     @property
     def freedom(self) -> float:
@@ -295,8 +308,7 @@ def _advance(setting: Setting, progress: _Progress, number: int, catalogue_first
     point, is_coarse = progress.point, number < len(COARSE)
     X, g = setting.linearise(point, progress.scales)
     if progress.limits is None:
-        X, scales = scale_components(X, g, setting.base_size)
-        g = gram(X, g.blocks, scales, setting.base_size)
+        X, g = scale_components(X, g)
         largest = LARGEST * g.squares / g.rows * setting.floor**2
         progress = replace(progress, limits={c.name: largest for c in point.components if not c.noise})
     limits = {
@@ -355,7 +367,8 @@ def _take_step(setting: Setting, point: Point, X: Array, g: Gram, sizes: Sizes, 
     reshaped = refine_shapes(point.components, point.state, setting.white, X, g, sizes)
     if reshaped is None:
         return moved
-    reshaped_g = setting.linearise(replace(point, components=reshaped), g.scales)[1]
+    acting = [c for c in reshaped if c.name in sizes.variances]
+    reshaped_g = setting.linearise(replace(point, components=acting), g.scales)[1]
     reshaped_sizes = estimate(reshaped_g, sizes.variances, limits)
     reshaped_values = coefficients(reshaped_g, reshaped_sizes)
     reshaped_state = setting.state_at(reshaped_values, reshaped)

@@ -12,7 +12,7 @@ Source  Patterson and Thompson, Biometrika 58 (1971) 545; Wood and Fasiolo, Biom
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotrs, dtrtri
@@ -83,9 +83,19 @@ def whiten(
     return X.reshape(-1, X.shape[2]), blocks, column_scales
 
 
-def gram(X: Array, blocks: Mapping[str, slice], scales: Mapping[str, float], b: int) -> Gram:
-    """Products of whitened columns [base (b), components, data], the base eliminated."""
-    return eliminate_base(X.T @ X, blocks, scales, b, len(X))
+def gram(X: Array, blocks: Mapping[str, slice], scales: Mapping[str, float], b: int, channels: int = 1) -> Gram:
+    """Products of whitened columns [base (b), components, data], (channels * rows, ...), the base eliminated."""
+    return eliminate_base(_products_by_channel(X, channels), blocks, scales, b, len(X))
+
+
+def _products_by_channel(X: Array, channels: int) -> Array:
+    """X'X for the rows of one channel after another: most columns belong to one channel and are zero in the others."""
+    products = np.zeros((X.shape[1], X.shape[1]))
+    for rows in X.reshape(channels, -1, X.shape[1]):
+        used = np.flatnonzero(rows.any(axis=0))
+        part = rows[:, used]
+        products[used[:, None], used] += part.T @ part
+    return products
 
 
 def eliminate_base(G: Array, blocks: Mapping[str, slice], scales: Mapping[str, float], b: int, rows: int) -> Gram:
@@ -104,16 +114,25 @@ def eliminate_base(G: Array, blocks: Mapping[str, slice], scales: Mapping[str, f
     )  # fmt: skip
 
 
-def scale_components(X: Array, g: Gram, b: int) -> tuple[Array, dict[str, float]]:
-    """Columns and scales such that the part of each component orthogonal to the base has unit rms."""
-    X, scales = X.copy(), dict(g.scales)
+def scale_components(X: Array, g: Gram) -> tuple[Array, Gram]:
+    """Columns and products such that the part of each component beside the base has the squares of all of it."""
+    b, scales = len(g.base_inverse), dict(g.scales)
+    factors = np.ones(X.shape[1])
     for name, block in g.blocks.items():
         columns = X[:, b + block.start : b + block.stop]
-        raw = float(np.sum(columns * columns)) or 1.0
+        raw = float(np.vdot(columns, columns)) or 1.0
         factor = max(float(np.trace(g.products[block, block])) / raw, LEAST_BESIDE) ** 0.5
         scales[name] = g.scales[name] * factor
-        X[:, b + block.start : b + block.stop] = columns / factor
-    return X, scales
+        factors[b + block.start : b + block.stop] = factor
+    by_component = factors[b:-1]
+    scaled = replace(
+        g,
+        products=g.products / by_component[:, None] / by_component,
+        with_data=g.with_data / by_component,
+        scales=scales,
+        base_products=g.base_products / by_component,
+    )
+    return X / factors, scaled
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,21 +12,27 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Set
 from dataclasses import replace
 
-import numpy as np
-
 from calibrations.free_forms.chain import ModelEffects
-from calibrations.free_forms.descent import CONVERGED, SLOW_MOST, SearchResult, Setting, descend, take_damped_step
+from calibrations.free_forms.descent import (
+    CONVERGED,
+    NOISE_ALONE,
+    SLOW_MOST,
+    SearchResult,
+    Setting,
+    descend,
+    take_damped_step,
+)
 from calibrations.free_forms.jumps import STEPS
 from calibrations.free_forms.place_names import HISTORY
 from calibrations.free_forms.places_in_time import slow_noise
 from calibrations.free_forms.poses import PoseData
-from calibrations.free_forms.reml import coefficients, estimate, gram
+from calibrations.free_forms.reml import coefficients, estimate
 from calibrations.free_forms.selection import SPILL
 from calibrations.table import Array
 
 SETTLING = 6  # Gauss-Newton steps after components are left out
 SMALL_GAIN = 1.0  # of twice the log-likelihood
-NOISE_ALONE, FEW_COMPONENTS = 1.04, 3  # residual over noise, and number of components, up to which one start is enough
+FEW_COMPONENTS = 3  # up to which one start is enough, if they leave noise alone
 # The residual over the noise: a smaller one is explained without flicker; a larger one contains effects that the search
 # did not find.
 LEAST_MISFIT, MOST_MISFIT = 1.2, 2.0
@@ -43,6 +49,7 @@ def search(
     general: bool = True,
     noise_known: bool = True,
     reason: str = "",
+    origin: SearchResult | None = None,
 ) -> SearchResult:
     """Places that act, with their sizes: the likeliest result of several starts.
 
@@ -52,26 +59,36 @@ def search(
        they have to gain clearly.
     4. If that leaves more than noise: steps over the output, where there are any beside all smooth forms.
     5. If flicker of any size is likelier than the components over time: all again with such flicker. This is left out
-       if a misfit may look like flicker: with effects of the given model, or with a large residual.
+       if a misfit may look like flicker: with effects of the given model, a large residual, or no random walks.
 
     white    standard deviation of each mean, (channels, n)
     general  whether components that can follow almost anything are tried
     noise_known  whether `white` is the noise of the means; else it is the misfit of an earlier search
     reason   why this search follows another one, for the progress
+    origin   a search with nearly the same noise that left no more than noise: this one continues from its end
     """
     setting = Setting(data, white, model_effects)
-    best = _search_from_all(setting, general, reason)
-    asked = noise_known and not model_effects.columns.shape[2] and LEAST_MISFIT < best.ratio < MOST_MISFIT
-    if not asked or not _is_flicker(best):
+    best = _search_from_all(setting, general, reason) if origin is None else _continue(origin, setting, general, reason)
+    asked = general and noise_known and not model_effects.columns.shape[2]
+    if not asked or not LEAST_MISFIT < best.ratio < MOST_MISFIT or not _is_flicker(best):
         return best
     in_flicker = _search_from_all(replace(setting, flicker=True), general, f"{reason}again with flicker noise, ")
     return min(best, in_flicker, key=lambda end: end.criterion)
 
 
+def _continue(origin: SearchResult, setting: Setting, general: bool, reason: str) -> SearchResult:
+    """The end of a descent from the end of another search."""
+
+    def descent(origin: SearchResult) -> SearchResult:
+        return descend(setting, general, f"{reason}continued", jumps=STEPS in origin.active, origin=origin)
+
+    return _without_remainders(descent(origin), descent)
+
+
 def _search_from_all(setting: Setting, general: bool, reason: str) -> SearchResult:
     """The likeliest end of several beginnings."""
     effects_first = descend(setting, general, f"{reason}effects first", catalogue_first=True)
-    if effects_first.ratio < NOISE_ALONE and len(effects_first.active) <= FEW_COMPONENTS:
+    if effects_first.leaves_noise and len(effects_first.active) <= FEW_COMPONENTS:
         return effects_first
     together = descend(setting, general, f"{reason}all forms together")
     best = min(effects_first, together, key=lambda end: end.criterion)
@@ -149,27 +166,17 @@ def _is_flicker(result: SearchResult) -> bool:
         return False
     data, setting = result.data, result.setting
     noise = slow_noise(data, all_frequencies=True)
-    columns, blocks = [result.columns[:, :-1]], {n: b for n, b in result.gram.blocks.items() if n not in _noise(result)}
-    start = len(result.gram.with_data)
-    for component in noise:
-        extra_columns = component.jacobian(result.state) / result.white[:, :, None]
-        blocks[component.name] = slice(start, start + extra_columns.shape[2])
-        start += extra_columns.shape[2]
-        columns.append(extra_columns.reshape(-1, extra_columns.shape[2]))
-    scales = dict(result.gram.scales) | {component.name: 1.0 for component in noise}
-    g = gram(np.hstack([*columns, result.columns[:, -1:]]), blocks, scales, setting.base_size)
+    others = [c for c in result.components if not c.noise and (c.name in result.sizes.variances or c.name == LINE)]
+    scales = {**result.gram.scales, **{component.name: 1.0 for component in noise}}
+    g = setting.linearise(replace(result.point, components=[*others, *noise]), scales)[1]
     begin = {component.name: (FLICKER_BEGIN * setting.floor) ** 2 for component in noise}
     acting_variances = {name: v for name, v in result.sizes.variances.items() if name not in begin}
-    drift = {LINE: acting_variances.get(LINE, 1.0)} if LINE in blocks else {}
+    drift = {LINE: acting_variances.get(LINE, 1.0)} if LINE in g.blocks else {}
     other_variances: Mapping[str, float] = (
         {n: v for n, v in acting_variances.items() if n not in following} | drift | begin
     )
     limited = estimate(g, acting_variances | begin, setting.slow_limits(noise, SLOW_MOST))
     return estimate(g, other_variances, dict.fromkeys(other_variances, ANY)).deviance < limited.deviance - LIKELIER
-
-
-def _noise(result: SearchResult) -> set[str]:
-    return {component.name for component in result.components if component.noise}
 
 
 def _follows_time(result: SearchResult, name: str) -> bool:

@@ -20,7 +20,7 @@ from calibrations.free_forms.form import CROSS, Form
 from calibrations.free_forms.geometry import LINEAR_PART, Geometry, GeometryEffects, geometry
 from calibrations.free_forms.place_names import HISTORY, place_of_effect
 from calibrations.free_forms.poses import PoseData
-from calibrations.free_forms.search import NOISE_ALONE, search
+from calibrations.free_forms.search import MOST_MISFIT, search
 from calibrations.free_forms.selection import ENTER
 from calibrations.free_forms.stairs import SAW, Stairs
 from calibrations.geometry.orientation import out_of_plane
@@ -244,13 +244,18 @@ def with_stairs(structure: Structure, residual: Array, stairs: Stairs, white: Ar
 
 
 def find_structure(
-    table: Table, white: Array | None, model_effects: ModelEffects, effects: GeometryEffects
+    table: Table,
+    white: Array | None,
+    model_effects: ModelEffects,
+    effects: GeometryEffects,
+    of_residual: bool = False,
 ) -> Structure:
     """Places that act in poses, rows in order of time.
 
     white    standard deviation of each mean, (channels, n); None where it is not known
     model_effects    effects of the given model beyond bias, scale factor and geometry
     effects  those of the geometry
+    of_residual  whether `white` is the noise that an earlier search of these rows found in its residual
     """
     data = PoseData.of(table)
     source = FloorSource.SAMPLES
@@ -259,7 +264,7 @@ def find_structure(
     usual = np.sqrt(np.mean(white**2, axis=1, keepdims=True))
     if np.any(noiseless := white < NO_NOISE * usual):  # these rows have less noise than others, and contradict nothing
         result = search(data, np.where(noiseless, LEAST_WHITE * usual, white), model_effects)
-    elif SAW in table.left_out:  # the noise is what the stairs hide of each row: never the same for all
+    elif of_residual or SAW in table.left_out:  # what the stairs hide of each row is never the same for all
         result = search(data, white, model_effects)
     else:
         result, source = _search_with_noise(data, white, model_effects, source)
@@ -287,21 +292,24 @@ def _search_with_noise(
 ) -> tuple[SearchResult, FloorSource]:
     """The search, and where its noise is known from: again with the noise of the residual where that contradicts.
 
-    Components that can follow almost anything wait until the noise is known, because they follow noise as well.
+    Components that can follow almost anything wait until the noise is known, because they follow noise as well; not
+    one that already acts in noise that is too large.
     """
     result = search(data, white, model_effects)
     noise = _scatter(result, source, uniform=True)
     if noise is None:
         return result, source
     source = FloorSource.CONTRADICTED if source is FloorSource.SAMPLES else source
+    general = result.ratio < LEAST_NOISE and any(result.component(name).general for name in result.active)
     for number in range(1, FLOOR_ROUNDS + 1):
         reason = f"with the noise of the residual, round {number}, "
-        result = search(data, noise, model_effects, general=False, reason=reason)
+        origin = result if number > 1 and result.ratio < MOST_MISFIT else None
+        result = search(data, noise, model_effects, general=general, reason=reason, origin=origin)
         next_noise = _scatter(result, source, uniform=False)
         if next_noise is None:
             break
         noise = next_noise
-    if result.ratio >= NOISE_ALONE:
+    if not general and not result.leaves_noise:
         result = search(data, noise, model_effects, reason="with the noise of the residual and every component, ")
     return result, source
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from calibrations.criteria import MATERIAL, MOST_UNSEEN
 from calibrations.discovery.plausibility import _stuck, doubt, findings, refusal
 from calibrations.discovery.readings import zero_doubt
 from calibrations.discovery.verdict import Verdict
@@ -114,6 +115,33 @@ MIRRORED = {
     "beta backwards": lambda d: replace(d, beta=-d.beta),
     "turned by 180 deg": lambda d: replace(d, vx=5 - d.vx, vy=5 - d.vy),
 }
+
+
+def few_poses(seed: int = 5) -> Table:
+    """Eight poses, each measured 38 times; the stages' angles err by up to 0.1 deg, at each pose the same."""
+    alpha, beta = np.array([90, 60, 90, 120, 90, 30, 90, 150.0]), np.arange(0, 360, 45.0)
+    order = np.concatenate([np.arange(8) if k % 2 == 0 else np.arange(8)[::-1] for k in range(38)])
+    wrong = np.random.default_rng(1).choice([-0.1, 0.1], 8)
+    columns = {"alpha_deg": alpha[order], "beta_deg": beta[order], "t_s": 10.0 * np.arange(len(order))}
+    ax, ay, _ = components({**columns, "beta_deg": (beta + wrong)[order]})
+    outputs = 2.5 + np.array([ax, ay]) + NOISE_V * np.random.default_rng(seed).standard_normal((2, len(order)))
+    known = {name: np.full(len(order), NOISE_V * np.sqrt(500)) for name in ("vx_std_v", "vy_std_v")}
+    samples = {"vx_v": outputs[0], "vy_v": outputs[1], **known, "n": np.full(len(order), 500.0)}
+    return Table.from_columns("poses", columns | samples, source="made")
+
+
+def test_an_error_of_each_pose_is_no_second_sensor() -> None:
+    table = few_poses()
+    assert findings(table) == ()
+    mixed = table.with_outputs(table.outputs + 0.02 * (np.random.default_rng(3).random(table.n) < 0.5)[:, None])
+    assert "two groups of rows" in findings(mixed)[0].text
+
+
+def test_a_model_that_follows_a_few_poses_alone_says_so() -> None:
+    found = discover(few_poses(), read_model("linear"), catalogue())
+    assert found.end.pooled_excess < MATERIAL < MOST_UNSEEN < found.end.held_out_excess
+    assert "these rows are at few poses: measure at more orientations" in str(found.residual_structure)
+    assert found.verdict != Verdict.ADEQUATE
 
 
 def test_healthy_data_get_no_finding() -> None:

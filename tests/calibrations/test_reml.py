@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from calibrations.free_forms.components import Component
-from calibrations.free_forms.reml import estimate, gains, gram
+from calibrations.free_forms.reml import estimate, gains, gram, scale_components
 from calibrations.free_forms.selection import pools_of, select
 
 
@@ -63,6 +63,27 @@ def test_a_base_column_of_rounding_takes_up_nothing() -> None:
     alone = gram(X[:, [0, 2, 3]], {"curve": slice(0, 1)}, {"curve": 1.0}, 1)
     assert (g.base_rank, g.base_inverse[1, 1]) == (1, 0.0)
     assert g.squares == pytest.approx(alone.squares)
+
+
+def test_products_by_channel_are_those_of_all_rows() -> None:
+    X = np.random.default_rng(8).standard_normal((80, 9))
+    X[:40, 3:5], X[40:, 5:7] = 0.0, 0.0  # columns of one channel each
+    blocks = {"second": slice(0, 3), "first": slice(3, 6)}
+    by_channel, at_once = (gram(X, blocks, dict.fromkeys(blocks, 1.0), 2, channels) for channels in (2, 1))
+    np.testing.assert_allclose(by_channel.products, at_once.products, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(by_channel.with_data, at_once.with_data, rtol=1e-12, atol=1e-12)
+
+
+def test_scaled_components_keep_their_squares_beside_the_base() -> None:
+    X = np.random.default_rng(9).standard_normal((60, 8)) * np.geomspace(1e-3, 1e3, 8)
+    blocks = {"small": slice(0, 2), "large": slice(2, 5)}
+    scaled_X, scaled = scale_components(X, gram(X, blocks, {"small": 2.0, "large": 1.0}, 2))
+    again = gram(scaled_X, blocks, scaled.scales, 2)
+    np.testing.assert_allclose(scaled.products, again.products, rtol=1e-9)
+    np.testing.assert_allclose(scaled.with_data, again.with_data, rtol=1e-9)
+    for block in blocks.values():
+        squares = float(np.sum(X[:, 2:][:, block] ** 2))
+        assert np.trace(scaled.products[block, block]) == pytest.approx(squares)
 
 
 def test_two_components_that_cancel_each_other_do_not_keep_a_third_one_out() -> None:

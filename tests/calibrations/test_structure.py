@@ -104,7 +104,7 @@ def test_noise_has_no_structure() -> None:
 def test_only_a_motion_with_a_large_error_on_unseen_stretches_is_doubtful(
     moving: bool, factor: float, doubtful: bool
 ) -> None:
-    table = SimpleNamespace(type=SimpleNamespace(moving=moving, stage_angles=not moving))
+    table = SimpleNamespace(type=SimpleNamespace(moving=moving, stage_angles=not moving, same_pose=()))
     error = factor * MOST_UNSEEN
     fitted = SimpleNamespace(table=table, held_out_excess=error, cross_validated_excess=1.0, pooled_excess=0.98)
     assert (poorly_predicted(fitted) is not None) == doubtful
@@ -121,7 +121,7 @@ def test_only_a_motion_with_a_large_error_on_unseen_stretches_is_doubtful(
 def test_a_model_that_follows_the_poses_of_its_fit_alone_is_doubtful(
     seen: float, cross_validated: float, unseen: float, doubtful: bool
 ) -> None:
-    table = SimpleNamespace(type=SimpleNamespace(moving=False, stage_angles=True))
+    table = SimpleNamespace(type=SimpleNamespace(moving=False, stage_angles=True, same_pose=()))
     fitted = SimpleNamespace(
         table=table, pooled_excess=seen, cross_validated_excess=cross_validated, held_out_excess=unseen
     )
