@@ -1,9 +1,11 @@
 """A signal ends a run once; a terminal that closes does not end what nohup started."""
 
+import inspect
 import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from threading import Event
 from types import FunctionType
 from typing import Any
@@ -11,7 +13,7 @@ from typing import Any
 import pytest
 
 from drivers.transport.link import OpenConnection
-from rig.runs.signals import QUESTIONS, SIGNALS, stoppable
+from rig.runs.signals import COUNTERS, FLEET_STARTS, QUESTIONS, SIGNALS, stoppable
 
 
 def twice(number: signal.Signals) -> None:
@@ -135,9 +137,19 @@ def signalled_in(module: str, name: str) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("module", "name"), [("drivers.world.world", "advance"), ("rich.console", "print"), ("rich.live", "start")]
+    ("module", "name"),
+    [
+        ("drivers.world.world", "advance"),
+        ("rich.console", "print"),
+        ("rich.live", "start"),
+        ("drivers.clock", "step"),
+        ("drivers.transport.link", "put"),
+        ("drivers.transport.link", "take"),
+        ("rig.fleet.cluster", "start_cluster"),
+        ("rig.fleet.cluster", "start_client"),
+    ],
 )
-def test_a_computing_world_and_a_screen_half_written_are_not_interrupted(module: str, name: str) -> None:
+def test_what_an_exception_would_break_is_not_interrupted(module: str, name: str) -> None:
     assert signalled_in(module, name) == ["whole"]
 
 
@@ -156,13 +168,21 @@ def test_a_delayed_signal_is_repeated_until_it_is_heard() -> None:
         take_bytes()
         Event().wait(30)  # the signal ends it
 
-    with pytest.raises(KeyboardInterrupt, match="SIGINT"), stoppable():
-        take_and_wait()
+    with stoppable():
+        with pytest.raises(KeyboardInterrupt, match="SIGINT"):
+            take_and_wait()
+        assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0), "the stop would be disturbed"
     assert 0 < repeated_s[0] < 0.1
-    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
 
 
-@pytest.mark.parametrize(("module", "name"), [*QUESTIONS, ("richer", "print"), ("rig.runs.runner", "run")])
+@pytest.mark.parametrize(("module", "name"), [*COUNTERS, *FLEET_STARTS, *QUESTIONS])
+def test_the_functions_in_which_a_signal_is_special_have_these_names(module: str, name: str) -> None:
+    assert f"def {name}(" in inspect.getsource(import_module(module))
+
+
+@pytest.mark.parametrize(
+    ("module", "name"), [("rich.console", "input"), ("richer", "print"), ("rig.runs.runner", "run")]
+)
 def test_every_wait_for_a_person_can_be_stopped(module: str, name: str) -> None:
     assert signalled_in(module, name) == []
 

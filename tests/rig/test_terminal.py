@@ -18,6 +18,7 @@ from rig.cli.terminal.guide import LinePrompt
 from rig.record import Record, Run
 from rig.runs.observer import NEXT_STEP
 from rig.runs.runner import REPEATED
+from rig.runs.signals import stoppable
 from tests.rig.rigging import POSES, SMALL_ARGUMENTS
 from tests.slow import first_fast
 
@@ -161,8 +162,36 @@ def test_a_question_reads_the_terminal_only_when_a_line_is_there(monkeypatch: py
 
     monkeypatch.setattr("select.select", nobody_typed_twice)
     monkeypatch.setattr("builtins.input", lambda: f"after {len(waits)} waits")
+    shown = StringIO()
     with os.fdopen(person, "rb", 0), os.fdopen(terminal) as stdin:
         monkeypatch.setattr("sys.stdin", stdin)
-        answer = LinePrompt.ask("Begin?", console=Console(file=StringIO()))
+        answer = LinePrompt.ask("Begin?", console=Console(file=shown))
     assert answer == "after 3 waits"
     assert max(waits) <= 0.2
+    assert shown.getvalue().startswith("Begin?")
+
+
+def test_a_signal_ends_a_question_while_it_waits_for_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Elsewhere in the code of the screen a signal waits."""
+    person, terminal = os.openpty()
+    waits: list[float] = []
+
+    def stopped(files: list[TextIO], _write: object, _error: object, wait_s: float) -> list[list[TextIO]]:
+        waits.append(wait_s)
+        if len(waits) == 1:
+            signal.raise_signal(signal.SIGINT)
+        return [files, [], []]
+
+    monkeypatch.setattr("select.select", stopped)
+    monkeypatch.setattr("builtins.input", lambda: pytest.fail("the question went on"))
+    with os.fdopen(person, "rb", 0), os.fdopen(terminal) as stdin:
+        monkeypatch.setattr("sys.stdin", stdin)
+        with stoppable(), pytest.raises(KeyboardInterrupt, match="SIGINT"):
+            LinePrompt.ask("Begin?", console=Console(file=StringIO()))
+
+
+def test_a_question_reads_a_pipe_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its lines may be in a buffer of Python, which `select` does not see."""
+    monkeypatch.setattr("select.select", lambda *_: pytest.fail("it waits"))
+    monkeypatch.setattr("sys.stdin", StringIO("no\n"))
+    assert LinePrompt.ask("Begin?", console=Console(file=StringIO())) == "no"
