@@ -67,6 +67,7 @@ def test_columns_are_proposed_by_their_names_and_values(header: str, expected: s
         ("samples", 500, "n=samples"),
         ("Zeit [min]", 3, "t_s=Zeit [min]:min"),
         ("minutes", 3, "t_s=minutes:min"),
+        ("Hours", 3, "t_s=Hours:h"),
         ("temps (min)", 3, "t_s=temps (min):min"),
         ("temperature (s)", 3, "t_s=temperature (s):s"),
         ("humidity", 40, None),
@@ -88,13 +89,16 @@ def test_radians_are_proposed_as_such() -> None:
     assert proposed(f"alpha,beta,vx_v\n{rows}") == {"alpha_deg=alpha:rad", "beta_deg=beta:rad"}
 
 
-@pytest.mark.parametrize(("one_g", "unit"), [(1.0, "g"), (9.81, "m/s2"), (4096.0, "counts"), (2.5, "V")])
+@pytest.mark.parametrize(
+    ("one_g", "unit"), [(1.0, "g"), (9.81, "m/s2"), (4096.0, "counts"), (2.5, "V"), (3.0, "counts"), (4096.5, "counts")]
+)
 def test_three_axes_are_positions_in_the_unit_that_gravity_gives(one_g: float, unit: str) -> None:
     rows = "".join(f"{k},{one_g * (k == 0)},{one_g * (k == 1)},{one_g * (k == 2)},7\n" for k in range(3))
     content = f"time,accX,accY,accZ,gyrX\n{rows}"
     assert likely_kind(laid(content)) == "positions"
     axes = {f"a{axis}=acc{axis.upper()}:{unit}" for axis in "xyz"}
     assert proposed(content) == {"t_s=time", "gx=gyrX", *axes}
+    assert proposed(content.replace(f"{one_g}", f"-{one_g}")) == {"t_s=time", "gx=gyrX", *axes}
 
 
 def test_columns_without_names_are_told_by_their_values() -> None:

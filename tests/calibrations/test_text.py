@@ -16,6 +16,7 @@ from calibrations.text import (
     join_words,
     milli_amount,
     parameter_words,
+    positive_text,
     probability,
     rounded,
     typeset,
@@ -35,6 +36,7 @@ def test_names_are_joined_by_commas_and_and() -> None:
         ("axis-nonorthogonality.xy", "the nonorthogonality of x and y"),
         ("gyro-scale-factor.x", "the gyroscope scale factor of x"),
         ("field-strength", "the field strength"),
+        ("stage-eccentricity.sine", "the stage eccentricity sine"),
     ],
 )
 def test_a_parameter_has_words(key: str, shown: str) -> None:
@@ -55,6 +57,14 @@ def test_a_parameter_has_words(key: str, shown: str) -> None:
 )
 def test_values_are_rounded_to_two_digits_of_their_uncertainty(value: float, std: float | None, shown: str) -> None:
     assert estimate_text(value, std) == shown
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "shown"),
+    [(2.86, 0.42, "2.86(42)"), (0.84, 0.42, "0.84(42)"), (0.83, 0.42, "at most 1.7"), (2.5, None, "2.5")],
+)
+def test_a_time_within_twice_its_uncertainty_has_an_upper_bound(value: float, std: float | None, shown: str) -> None:
+    assert positive_text(value, std) == shown
 
 
 @pytest.mark.parametrize(
@@ -90,10 +100,22 @@ def test_a_sign_is_for_expanded_uncertainties(value: float, expanded: float, sho
 
 @pytest.mark.parametrize(
     ("value", "shown"),
-    [(0.0, "0"), (142.255, "142"), (1234.0, "1234"), (0.0410672, "0.0411"), (-2.5e-6, "−2.50 × 10⁻⁶")],
+    [
+        (0.0, "0"),
+        (142.255, "142"),
+        (1234.0, "1234"),
+        (-1234.0, "−1234"),
+        (12345678.0, "1.23 × 10⁷"),
+        (0.0410672, "0.0411"),
+        (-2.5e-6, "−2.50 × 10⁻⁶"),
+    ],
 )
 def test_a_number_without_uncertainty_has_few_digits(value: float, shown: str) -> None:
     assert few_digits(value) == shown
+
+
+def test_a_reference_value_has_the_digits_that_are_asked_for() -> None:
+    assert few_digits(23.4567, 4) == "23.46"
 
 
 @pytest.mark.parametrize(
@@ -116,6 +138,7 @@ def test_probabilities_and_units_are_formatted() -> None:
         (0.4995, 12.4995, "0.5 to 12.5"),
         (4.99981, 5.00012, "4.99981 to 5.00012"),
         (3.0, 3.0, "3 to 3"),
+        (-0.001, 2.0, "0 to 2"),
     ],
 )
 def test_an_interval_has_a_hundredth_of_its_length(low: float, high: float, shown: str) -> None:
