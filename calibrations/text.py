@@ -264,7 +264,7 @@ def parameter_words(key: str) -> str:
     """A parameter by its key in words: `the scale factor of x`, `the nonorthogonality of x and y`."""
     name, _, axes = key.rpartition(".") if set(key.rpartition(".")[2]) <= set("xyz") else (key, "", "")
     words = re.sub(r"[-_.]", " ", name.removeprefix("axis-").replace("gyro-", "gyroscope "))
-    return f"the {words} of {join_words(axes)}" if axes else f"the {words}"
+    return f"the {words} of {join_words(dict.fromkeys(axes))}" if axes else f"the {words}"
 
 
 def capital(text: str) -> str:

@@ -36,6 +36,7 @@ def test_names_are_joined_by_commas_and_and() -> None:
         ("axis-nonorthogonality.xy", "the nonorthogonality of x and y"),
         ("gyro-scale-factor.x", "the gyroscope scale factor of x"),
         ("field-strength", "the field strength"),
+        ("soft-iron.xx", "the soft iron of x"),
         ("stage-eccentricity.sine", "the stage eccentricity sine"),
     ],
 )
