@@ -123,6 +123,8 @@ def test_a_plan_without_poses_and_turns_promises_none() -> None:
     assert facts["Stores"] == "its readings, and no poses"
     assert facts["Turns alpha"].startswith("to 0 deg; the limits are ")
     assert facts["Turns beta"].startswith("from 0 to 180 deg; ")
+    whole = planned()
+    assert plan_facts(replace(whole, held=whole.held[:1]), read_bench())["Stores"].startswith("1 pose, ")
 
 
 def test_the_page_shows_before_a_resume_what_remains_with_the_same_limits() -> None:

@@ -165,6 +165,16 @@ def test_what_is_no_calibration_is_passed_over_and_said(rig: Rig, years: None) -
     assert f"Not used: {rest}: models are fitted to" in rig("history", "17").err
 
 
+@pytest.mark.parametrize("search", [lambda record, sensor, model: history(record, sensor, model, {}), latest])
+def test_a_run_that_gives_no_calibration_is_named_once(search: Callable[..., object]) -> None:
+    columns = {name: values[:2] for name, values in COLUMNS.items()} | {"vx_v": [1.0, 2.0]}
+    with Record() as record:
+        run = record.add_table(Table.from_columns("poses", columns, {"serial": "19"}, "short"))
+        with pytest.raises(RecordError, match=r"cannot use its runs: .* 2 rows cannot determine") as refused:
+            search(record, "19", read_model("linear"))
+    assert str(refused.value).count(run) == 1
+
+
 def test_a_date_that_cannot_be_read_is_refused(golden, refused: Callable[..., str]) -> None:
     calibrated("19", "last week", 2.5)
     golden.same(refused("history", "19"))

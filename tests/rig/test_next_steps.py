@@ -110,6 +110,7 @@ def test_a_result_and_its_limit_have_a_unit_that_is_easy_to_read() -> None:
         "bias-x": of(2.5, 1e-5, "V", [2.4, 2.6]),
         "A/scale-temperature-x": of(1.88e-4, 0.21e-4, "1/K", 0.0003),
         "scale-tolerance-x": of(1.5e-4, None, ""),
+        "temperature-wander": of(153.0, None, "K"),
         "scale-drift-x": of(0.0, 1.2e-4, ""),
         "scale-x": of(1.006169, 2.5e-5, "V/g"),
         "improvement-x": of(0.97648, 0.00048, "", [0.9, 1]),
@@ -117,7 +118,9 @@ def test_a_result_and_its_limit_have_a_unit_that_is_easy_to_read() -> None:
         "field": of(0.0410672, None, "per mille"),
         "scale-as-is-x": of(0.0, 2.2e-5, ""),
         "bias-power-x": of(1.2e-4, 0.2e-4, "V"),
-        "correction-xy": of(0.00029481532, None, ""),
+        "a1/bias-mount-x": of(0.0, 0.2e-3, "V"),
+        "correction-xx": of(1.0003951, None, ""),
+        "a1/correction-xy": of(0.0065870211, None, ""),
         "rounds": of(1234.0, None, ""),
     }
     assert [(row.value, row.limit) for row in result_rows(results)] == [
@@ -125,6 +128,7 @@ def test_a_result_and_its_limit_have_a_unit_that_is_easy_to_read() -> None:
         ("2.500000(10) V", "2.4 to 2.6 V"),
         ("0.0188(21) %/K", "at most 0.03 %/K"),
         ("0.015 %", ""),
+        ("153 K", ""),
         ("0.000(12) %", ""),
         ("1.006169(25) V/g", ""),
         ("97.648(48) %", "90 to 100 %"),
@@ -132,7 +136,9 @@ def test_a_result_and_its_limit_have_a_unit_that_is_easy_to_read() -> None:
         ("0.0411 per mille", ""),
         ("at most 0.0044 %", ""),
         ("120(20) µV", ""),
-        ("0.000295", ""),
+        ("at most 0.40 mV", ""),
+        ("1.000395", ""),
+        ("0.006587", ""),
         ("1234", ""),
     ]
     assert results_table(results)[1].split()[1:] == ["785.5(73)", "uV", "at", "most", "3.5", "mV"]
@@ -147,6 +153,11 @@ def test_the_steady_state_is_a_sentence_with_times_of_three_digits() -> None:
     ]
     wider = forecast | {"steady-state-latest": {**time, "value": 3.1}}
     assert "2.35 h to 3.10 h (95 %)" in results_table(not_reached | wider)[1]
+    early = {
+        "steady-state": {**time, "value": 1.0, "unit": ""},
+        "steady-state-time": {**time, "value": 0.5, "std": 0.4},
+    }
+    assert "Reached at most 1.3 h after power-on." in results_table(early)[1]
 
 
 @pytest.mark.parametrize("remedy", REMEDIES.values())
@@ -170,7 +181,9 @@ def test_a_page_names_results_in_words() -> None:
 
 
 def test_a_page_proposes_the_longer_measurement() -> None:
-    run = replace(RUN, settings={"duration_s": 60.0}, results={"noise-rms-x": result("marginal")})
+    settings = {"duration_s": 60.0}
+    run = replace(RUN, procedure="noise-floor", settings=settings, results={"noise-rms-x": result("marginal")})
     (step,) = page_steps(run, {})
-    assert step.to == {"Measure longer": "/run?procedure=sweep&duration_s=240"}
+    assert step.to == {"Measure longer": "/run?procedure=noise-floor&duration_s=240"}
+    assert step.text.startswith(f'Marginal: "{label("noise-floor", "noise-rms-x")}" reaches across the limit')
     assert "4 times the duration halves" in step.text

@@ -14,14 +14,14 @@ from rig.bench.file import HAND
 from rig.bench.result_names import RESULTS, label
 from rig.files import home
 from rig.planning.next_experiment import as_proposed
-from rig.record import Record
+from rig.record import Record, Run
 from rig.runs.background.status import Status
 from rig.services.next_steps import result_rows
 from rig.services.page_words import page_step
 from rig.services.tables import with_run_ids
 from rig.web.frame import news
 from rig.web.pages.next_experiment import preparation
-from rig.web.pages.run_record import shortened
+from rig.web.pages.run_record import _circumstances, shortened
 from rig.web.pages.run_report import ReportVerdict, verdict_of
 from rig.web.parts import for_page, with_labels
 
@@ -143,7 +143,9 @@ def test_the_head_of_a_report_has_its_verdict() -> None:
 
 def test_the_message_of_a_run_is_whole() -> None:
     text = 30 * "a reason, " + "and what to do"
-    assert shortened("message", text) == text
+    run = Run("r1", "poses", "sweep", "stopped", {}, {}, {}, "", {}, "", "", None, None, {}, 20)
+    told = _circumstances(replace(run, message=text))[0]
+    assert {shortened(name, value) for name, value in told.items() if value == text} == {text}
     assert shortened("columns", text) == f"{text[:200]} ..."
     assert shortened("step (deg)", "10") == "10"
 

@@ -67,6 +67,7 @@ def test_a_page_has_the_question_of_an_answer_and_no_pose_zero() -> None:
         ("answer", "Is the sensor mounted face up on the table? Can its cable turn freely? yes"),
     ]
     assert ("resumed", f"sweep after {run.rows} poses") in events
+    assert in_words(Event("", "resumed", "sweep at pose 1"), {}).text == "sweep after 1 pose"
     older = Event("", "answer level-front-x", "-0.0")
     assert in_words(older, {}).text == "level front x: 0"
     assert in_words(older, {"level-front-x": "What does it show along x, in deg?"}).text.endswith("in deg? 0")

@@ -13,7 +13,7 @@ from procedures.settings import parse
 from rig.bench import read_bench
 from rig.bench.file import DEMO, HAND
 from rig.cli.terminal.watch import Quiet
-from rig.errors import InstrumentFailed
+from rig.errors import InstrumentFailed, RigError, Stopped
 from rig.files import home
 from rig.lease import lease
 from rig.record import Record
@@ -132,22 +132,27 @@ def test_a_run_that_reaches_its_target_early_is_whole() -> None:
     assert progress_words(last) == "23 turns and rests"
 
 
-@pytest.mark.parametrize("retried", [False, True])
+@pytest.mark.parametrize(
+    ("error", "retried", "said"),
+    [
+        (InstrumentFailed("beta is away"), False, "beta is away"),
+        (InstrumentFailed("beta is away"), True, "continuing failed at TIME UTC: beta is away"),
+        (Stopped("stopped by a person"), False, ""),
+    ],
+)
 def test_a_click_on_continue_that_fails_changes_what_the_page_says(
-    monkeypatch: pytest.MonkeyPatch, retried: bool
+    monkeypatch: pytest.MonkeyPatch, error: RigError, retried: bool, said: str
 ) -> None:
     folder().mkdir(parents=True)
     monkeypatch.setattr(Attendant, "_answer", lambda *_: "end")
     with Record() as record:
         name = record.begin("sweep", {}, bench={}, identities={}, configuration="", source="a test", constants={})
-        outcome = Outcome(record.run(name), InstrumentFailed("beta is away"), retried=retried)
+        outcome = Outcome(record.run(name), error, retried=retried)
     Attendant(Order(KEY, "sweep"), read_bench(None)).interrupted(outcome)
     with lease(home(), lock(KEY), "a test"):
         status = read(KEY)
     assert status is not None
-    assert re.sub(r"\d\d:\d\d:\d\d", "TIME", status.error) == (
-        "continuing failed at TIME UTC: beta is away" if retried else "beta is away"
-    )
+    assert re.sub(r"\d\d:\d\d:\d\d", "TIME", status.error) == said
 
 
 def test_the_status_of_a_killed_process_is_that_of_its_record() -> None:
