@@ -8,8 +8,10 @@ from typing import Any
 
 import pytest
 
+from calibrations.discovery.check_poses import MARK
 from rig.bench.result_names import names_with_limits
 from rig.record import Record
+from rig.record.measured import table_of
 from tests.rig.conftest import Rig
 
 QUIET = [2.50001, 2.49999] * 5
@@ -35,6 +37,9 @@ def test_a_check_standard_is_measured_and_begins_its_baseline(rig: Rig) -> None:
         ended = rig("run", "check-standard", "--dwell-s", "1", "--unattended", "--json")
     document = ended.document
     results = document["results"]
+    with Record() as record:
+        marks = set(table_of(record, document["run"]).labels["path"])
+    assert (len(marks), any(mark.startswith(MARK) for mark in marks)) == (1, False), "no check poses of another run"
     assert (ended.status, document["poses"], set(results)) == (0, 8, {"bias-x", "scale-x", "bias-y", "scale-y"})
     assert (results["bias-x"]["unit"], results["scale-x"]["unit"]) == ("V", "V/g")
     assert set(results) <= set(names_with_limits())
