@@ -107,6 +107,7 @@ def test_the_last_status_counts_the_poses_of_the_record() -> None:
     last = read(KEY)
     assert last is not None
     assert (last.phase, last.done, last.state, last.error) == ("ended", 8, "stopped", "stopped")
+    assert progress_words(last) == "8 of 10 poses"
 
 
 def test_a_run_that_reaches_its_target_early_is_whole() -> None:

@@ -232,12 +232,13 @@ def test_all_are_told_to_stop_before_the_first_is_waited_for() -> None:
     log: list[str] = []
     movers: dict[str, Any] = {"alpha": Mover("alpha", log, "halt"), "beta": Mover("beta", log, "stop")}
     clock = GuardedClock(SimulatedClock())
-    rig = Rig(BENCH, movers | {"oven": Mover("oven", log)}, clock, None, (), PersonLink())
+    rig = Rig(BENCH, movers | {"oven": Mover("oven", log, "run False")}, clock, None, (), PersonLink())
     assert rig.stop() == [
         (
             "beta may still move: press the emergency stop, or switch its drive off. "
             "The command to stop failed: whatever it is"
-        )
+        ),
+        "oven may still heat: switch it off by hand. The command to stop failed: whatever it is",
     ]
     assert log == ["alpha halt", "beta halt", "alpha stop", "beta stop", "oven run False"]
 
