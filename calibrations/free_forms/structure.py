@@ -20,7 +20,7 @@ from calibrations.free_forms.form import CROSS, Form
 from calibrations.free_forms.geometry import LINEAR_PART, Geometry, GeometryEffects, geometry
 from calibrations.free_forms.place_names import HISTORY, place_of_effect
 from calibrations.free_forms.poses import PoseData
-from calibrations.free_forms.search import MOST_MISFIT, search
+from calibrations.free_forms.search import search
 from calibrations.free_forms.selection import ENTER
 from calibrations.free_forms.stairs import SAW, Stairs
 from calibrations.geometry.orientation import out_of_plane
@@ -303,7 +303,7 @@ def _search_with_noise(
     general = result.ratio < LEAST_NOISE and any(result.component(name).general for name in result.active)
     for number in range(1, FLOOR_ROUNDS + 1):
         reason = f"with the noise of the residual, round {number}, "
-        origin = result if number > 1 and result.ratio < MOST_MISFIT else None
+        origin = result if number > 1 and result.leaves_noise else None  # else its places are uncertain
         result = search(data, noise, model_effects, general=general, reason=reason, origin=origin)
         next_noise = _scatter(result, source, uniform=False)
         if next_noise is None:
