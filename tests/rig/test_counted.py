@@ -56,7 +56,9 @@ def steps(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     def descended(_setting: object, _general: bool, step: str, **_options: object) -> SimpleNamespace:
         steps.append(step)
         place = SimpleNamespace(place="history")
-        return SimpleNamespace(ratio=MOST_MISFIT + 0.1, active=["loop"], criterion=0.0, component=lambda _: place)
+        return SimpleNamespace(
+            ratio=MOST_MISFIT + 0.1, leaves_noise=False, active=["loop"], criterion=0.0, component=lambda _: place
+        )
 
     monkeypatch.setattr(search, "descend", descended)
     return steps
