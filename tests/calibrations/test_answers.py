@@ -34,6 +34,7 @@ def result(question: str, kind: str) -> Result:
     return LOOP[question](synthetic.poses(columns, 2.5 + x + 0.01 * x**2, 2.5 + y), read_model("linear"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["poses", "still"])
 @pytest.mark.parametrize("question", LOOP)
 def test_every_answer_has_the_face_of_a_result(question: str, kind: str) -> None:

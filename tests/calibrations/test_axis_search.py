@@ -57,6 +57,7 @@ def search(centre: Centre = Centre(), rounds: int = 2, *, acts: float = 0.0, ran
     return Table.from_columns("poses", columns, {}, "search", {"path": tuple(p.path for p in poses)})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("centre", [Centre(), Centre(3, (-2, 4)), Centre(-170)])
 def test_directions_are_exact_without_noise(centre: Centre) -> None:
     found = estimate_directions(search(centre))
@@ -77,6 +78,7 @@ def test_the_angles_are_those_of_ang() -> None:
         np.testing.assert_allclose(found[axis].angles_deg, angles(alpha_deg, beta_deg), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_errors_of_directions_are_as_large_as_their_standard_errors() -> None:
     """300 searches with white noise: errors over standard errors, of all 10 numbers."""
     random = np.random.default_rng(3)

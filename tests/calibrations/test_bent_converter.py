@@ -48,6 +48,7 @@ def test_an_unknown_response_before_a_bent_converter_gets_no_names_of_four_effec
     assert found.findings.places[0].name == "own-response"
 
 
+@pytest.mark.slow
 def test_a_curve_over_the_output_does_not_explain_a_vibration_that_the_output_holds() -> None:
     data = bent_converter(vibration=8e-4, bow=8e-3, bend=-5.6e-3)
     result = structure(fit(read_model("linear"), data), catalogue()).result
@@ -80,12 +81,14 @@ def test_bits_of_wrong_weight_are_named_and_nothing_else(seed: int) -> None:
     assert found.findings.end.held_out_excess < 1.25
 
 
+@pytest.mark.slow
 def test_bits_of_wrong_weight_hide_no_other_cause() -> None:
     found = discover(converted(lambda force: 3e-3 * force**3))
     assert set(found.causes) == {"adc-nonlinearity", "cubic-nonlinearity"}
     assert found.findings.end.held_out_excess < 1.25
 
 
+@pytest.mark.slow
 def test_the_model_jumps_where_a_bit_changes() -> None:
     found = discover(converted(np.zeros_like))
     effects = [term.effect for term in found.findings.end.model.terms if isinstance(term.effect, FreeForm)]

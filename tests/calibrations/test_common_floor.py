@@ -97,6 +97,7 @@ def test_mixed_poses_of_unknown_noise_and_a_linear_sensor_miss_nothing() -> None
     assert found.verdict == "adequate"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [3, 9, 17])
 def test_a_scale_factor_that_follows_the_supply_is_found_in_few_poses_of_unknown_noise(seed: int) -> None:
     """It is a line over the supply, and no ratiometric output: only the free form of the cause describes it."""

@@ -87,6 +87,7 @@ def error(made: Compensation, within: Model, n: int = 500, seed: int = 0) -> flo
     return max(float(np.abs(found[f"a{axis}"] - a[:, "xyz".index(axis)]).max()) for axis in made.forward.axes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("values", [LINEAR, PHYSICAL, EVERYTHING], ids=["linear", "physical", "everything"])
 def test_it_gives_back_what_the_model_was_given(values: Any) -> None:
     fitted = model(values)

@@ -78,6 +78,7 @@ def test_on_the_way_of_the_stages_it_remembers_what_the_model_has() -> None:
     assert np.abs(forgetful["ax"] - a[:, 0])[settled].max() > 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_every_language_follows_the_same_samples(compiler: str, tmp_path: Path) -> None:
     made = both()

@@ -77,6 +77,7 @@ def test_amplitude_is_the_papers_with_its_uncertainty() -> None:
     assert all(abs(q.value - true) < 4 * q.std < 1e-3 * true for q in found)
 
 
+@pytest.mark.slow
 def test_uncertainties_are_the_scatter_between_records() -> None:
     found = [result(seed).rmse_physical for seed in range(12)]
     assert np.std([q.value for q in found]) == pytest.approx(np.mean([q.std for q in found]), rel=0.6)

@@ -25,6 +25,7 @@ def value(model: Model, effect: str, name: str, axis: str = "x") -> tuple[float,
     return found.value, found.std or np.inf
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("records", [10, *before_release([50])])
 def test_a_clean_record_misses_nothing(records: int) -> None:
     excesses, p_values = [], []
@@ -65,6 +66,7 @@ def test_parameters_are_right_within_their_uncertainty() -> None:
     assert np.all(np.abs(np.std(pulls, axis=0) - 1) < 0.45)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("times", [10, *slow([3]), *before_release([30])])  # the noise floor
 @pytest.mark.parametrize(
     ("effect", "hidden", "parameter", "true", "noise_v"),
@@ -101,6 +103,7 @@ def test_a_hidden_turn_is_found_first_where_attitudes_differ(turn_deg: float) ->
     assert abs(z - turn_deg) < 4 * std + 0.01 * turn_deg
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("more", first_fast([2e-3, 5e-4, 6e-3]))
 def test_a_scale_factor_that_differs_between_axes_is_found_first(more: float) -> None:
     table = shaken.record(shaken.TWO, 48.0, attitudes=ATTITUDES, scale_v=(1.0, 1 + more))
@@ -151,6 +154,7 @@ def test_comparison_gives_one_value_for_an_axis_and_says_which_part_is_off() -> 
     assert "x in quadrature at 10 Hz is off by" in document["fails"][0]["text"]
 
 
+@pytest.mark.slow
 def test_what_no_effect_explains_is_described() -> None:
     table = shaken.record(shaken.TWO, 20.0)
     echo = 1e-3 * np.cos(2 * np.pi * 10 * (table.time_s - 100) + 0.5) - 1e-3 * np.cos(

@@ -64,6 +64,7 @@ def test_a_base_that_moves_slowly_is_no_scatter_of_poses_in_random_order(seed: i
     assert "scatter of the poses" not in found.judgement.text
 
 
+@pytest.mark.slow
 def test_an_out_of_plane_gap_has_one_name_for_its_line_and_its_curve() -> None:
     a = forces(TURN)
     found = discover(TURN, a[:, :2] + 4e-3 / (1 - 0.35 * a[:, 2:]))
@@ -106,6 +107,7 @@ def test_a_warm_up_with_two_time_constants_is_one_cause() -> None:
     assert place.share > 0.9
 
 
+@pytest.mark.slow
 def test_an_eccentric_stage_with_a_second_wave_has_its_name() -> None:
     beta = np.radians(TURN["beta_deg"])
     found = discover(TURN, forces(TURN, beta_deg=0.1 * (np.sin(beta + 0.4) + 0.36 * np.sin(2 * beta + 1.1)))[:, :2])

@@ -96,6 +96,7 @@ def test_a_place_without_an_effect_or_without_one_driver_has_no_curve() -> None:
     assert place_curve(found, "history") is None
 
 
+@pytest.mark.slow
 def test_the_summary_has_a_line_for_each_cause_and_the_shares_of_the_steps_add_up() -> None:
     found = discover(table(1e-3 * np.cos(4 * FORCES[:, [1, 0]]) + 1e-3 * FORCES[:, :2] ** 3), read_model("linear"))
     lines = summary_lines(found)

@@ -47,6 +47,7 @@ def warming(held: Held, bend: float = 0.0) -> Array:
     return np.asarray(1.5e-3 * (u + bend * u**2)[:, None] * SHARES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("place", UNKNOWN_CURVES)
 def test_an_unknown_cause_has_its_place_and_no_name(place: str, seed: int) -> None:
@@ -61,6 +62,7 @@ def test_an_unknown_cause_has_its_place_and_no_name(place: str, seed: int) -> No
     assert _steps(found).rows[-1][-1] == "unknown cause"
 
 
+@pytest.mark.slow
 def test_the_curve_of_a_place_is_the_function_that_acts_within_its_band() -> None:
     held = Held(1)
     found = discovered(held.table(UNKNOWN_CURVES["cross-response"](held)))
@@ -78,6 +80,7 @@ def test_the_curve_of_a_place_is_the_function_that_acts_within_its_band() -> Non
     assert [picture.name for picture in place_pictures(found)] == ["shares", "place-cross-response"]
 
 
+@pytest.mark.slow
 def test_effects_of_the_catalogue_leave_no_form() -> None:
     held = Held(1)
     found = discovered(held.table(quadratic(held) + warming(held)))
@@ -86,6 +89,7 @@ def test_effects_of_the_catalogue_leave_no_form() -> None:
     assert found.end.pooled_excess < 1.1
 
 
+@pytest.mark.slow
 def test_what_a_model_has_already_is_not_found_again() -> None:
     held = Held(1)
     data = held.table(quadratic(held) + UNKNOWN_CURVES["cross-response"](held))
@@ -96,6 +100,7 @@ def test_what_a_model_has_already_is_not_found_again() -> None:
     assert (again.verdict, again.steps) == (Verdict.ADEQUATE, ())
 
 
+@pytest.mark.slow
 def test_a_second_place_is_found_beside_the_form_that_a_model_has() -> None:
     held = Held(1)
     one = UNKNOWN_CURVES["cross-response"](held)
@@ -143,12 +148,14 @@ def test_a_place_is_found_where_the_noise_is_not_stated() -> None:
     assert (found.causes, [place.name for place in found.findings.places]) == ((), ["cross-response"])
 
 
+@pytest.mark.slow
 def test_the_scatter_of_the_hand_has_no_place() -> None:
     for seed in range(2):
         found = discovered(Held(seed).table(scatter=3.0))
         assert (found.causes, found.steps, found.findings.places) == ((), (), ())
 
 
+@pytest.mark.slow
 def test_a_place_is_found_beside_the_scatter_of_the_hand() -> None:
     held = Held(1)
     found = discovered(held.table(2 * UNKNOWN_CURVES["own-response"](held), scatter=3.0))
@@ -156,6 +163,7 @@ def test_a_place_is_found_beside_the_scatter_of_the_hand() -> None:
     assert found.end.pooled_excess == pytest.approx(np.hypot(1, 3), rel=0.15)  # the curve does not follow the scatter
 
 
+@pytest.mark.slow
 def test_the_order_of_rows_changes_no_place() -> None:
     held = Held(2)
     data = held.table(UNKNOWN_CURVES["own-response"](held))

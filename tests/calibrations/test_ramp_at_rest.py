@@ -93,6 +93,7 @@ def test_a_ramp_that_does_nothing_is_no_cause() -> None:
         assert found_of(seed).causes == ()
 
 
+@pytest.mark.slow
 def test_noise_is_named_beside_what_the_temperature_does() -> None:
     result = found_of(line=5e-4, walk=1e-5)
     assert result.causes == (BIAS, "rate-random-walk")

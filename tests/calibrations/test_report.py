@@ -222,6 +222,7 @@ def test_it_holds_the_provenance_and_no_path_of_this_machine() -> None:
         assert fact in words
 
 
+@pytest.mark.slow
 def test_what_users_wrote_is_escaped() -> None:
     table = Table.from_columns("poses", warm_table().columns, {"sensor": "<script>alert(1)</script>"}, "<b>.csv")
     model = Model("<i>mine</i> & co", read_model("linear").terms)

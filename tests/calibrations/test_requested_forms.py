@@ -171,6 +171,7 @@ def test_a_component_has_as_many_columns_at_any_lead_of_a_coarse_thermometer() -
         assert curve.reshaped((-60.0,)).jacobian(state).shape == curve.jacobian(state).shape
 
 
+@pytest.mark.slow
 def test_a_place_left_out_gets_neither_a_cause_nor_a_curve() -> None:
     data = table(1e-3 * FORCES[:, [1, 0]] ** 2)
     assert discover(data, read_model("linear")).causes == ("cross-axis-bias",)

@@ -77,6 +77,7 @@ def test_the_bounds_hold_as_often_as_they_say_by_laws_that_are_not_the_filters_o
     assert 0.87 < np.mean(held) <= 1.0
 
 
+@pytest.mark.slow
 def test_what_is_known_is_so_and_is_known_early() -> None:
     known = [(each, looked(seed)[1]) for seed in range(SEEDS) for each in looked(seed)[0] if each.known]
     assert np.mean([each.final.low <= final <= each.final.high for each, final in known]) > 0.85

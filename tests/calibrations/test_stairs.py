@@ -95,6 +95,7 @@ def test_the_noise_of_rounded_means_is_that_of_draws() -> None:
     np.testing.assert_allclose(noise, np.maximum(drawn, 0.001), rtol=0.02)
 
 
+@pytest.mark.slow
 def test_a_tilt_is_found_behind_means_of_few_digits() -> None:
     x, y, z = components(POSES)
     values = np.stack([2.5 + 0.98 * (a + 0.004 * z + 0.002 * b) for a, b in ((x, y), (y, -x))])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import doctest
 
+import pytest
+
 import calibrations as cal
 import rig
 from tests.docs.markdown import ROOT
@@ -12,6 +14,7 @@ PAGE = ROOT / "docs" / "python.md"
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 
+@pytest.mark.slow
 def test_every_example_runs_as_written() -> None:
     ended = doctest.testfile(str(PAGE), module_relative=False, optionflags=FLAGS)
     assert ended.attempted > 15

@@ -54,6 +54,7 @@ def request(client: Any, number: int, interval_us: float) -> int:
     return int(answer.result)
 
 
+@pytest.mark.slow
 @pytest.mark.sockets
 @pytest.mark.parametrize("link", ["tcp", "udpin", "udpout"])
 def test_pymavlink_meets_the_autopilot_and_gets_the_rate_that_it_requests(serve: Serve, link: str) -> None:

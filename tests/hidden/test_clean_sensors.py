@@ -33,12 +33,14 @@ def test_of_a_sensor_without_a_cause_nothing_is_missing(slow: float) -> None:
         check_nothing_is_missing(layout, seed, slow)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", first_fast((19, 13, 25, 31), 1))
 def test_strong_flicker_is_no_drift(seed: int) -> None:
     found = discover(bent_in_flicker(seed), read_model("linear"))
     assert set(found.causes) == {"quadratic-nonlinearity", "cross-axis-bias"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", first_fast((7, 16, 19, 25), 1))
 def test_beside_strong_flicker_no_free_form_stays_in_the_model(seed: int) -> None:
     found = discover(bent_in_flicker(seed), read_model("linear"))

@@ -99,6 +99,7 @@ def test_vibration_in_the_standard_deviations_does_not_hide_slow_effects(tmp_pat
     assert end.held_out_excess < 1.15
 
 
+@pytest.mark.slow
 def test_a_second_search_beside_the_fitted_cause_reaches_the_floor(tmp_path: Path) -> None:
     random = np.random.default_rng([777, 93])
     path = tmp_path / "exponential.csv"

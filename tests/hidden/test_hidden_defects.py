@@ -64,6 +64,7 @@ def linear() -> Model:
     return read_model("linear")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("times_noise", [10, *before_release([3, 30])])
 @pytest.mark.parametrize("defect", first_fast(NAMES, (len(NAMES) + 1) // 2))
 def test_the_missing_effect_is_named_and_the_error_falls(defect: str, times_noise: int) -> None:

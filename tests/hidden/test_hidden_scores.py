@@ -37,6 +37,7 @@ def test_an_exception_of_the_search_is_an_error_and_no_answer() -> None:
     assert "errors: 1" in summary("single", [score("set", ["hysteresis"], answer, 0.0)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["single-010", "null-154", "pair-270"])
 def test_the_search_for_places_names_one_cause_and_none_on_a_clean_sensor(name: str) -> None:
     truth = json.loads((FOLDER / "truth.json").read_text())[name]["causes"]

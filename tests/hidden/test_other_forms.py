@@ -97,6 +97,7 @@ def test_a_place_of_one_effect_names_it_in_another_form() -> None:
     assert found.steps[-1].held_out_after < 1.15
 
 
+@pytest.mark.slow
 def test_a_limit_that_is_reached_gradually_is_a_saturation_with_a_wide_bend() -> None:
     found = found_with(limited)
     assert found.causes == ("saturation",)

@@ -82,6 +82,7 @@ def test_outliers_keep_their_numbers_when_other_poses_are_left_out() -> None:
     assert list(result.outliers) == rows
 
 
+@pytest.mark.slow
 def test_a_diagnosis_lists_outliers_too() -> None:
     table, rows = knocked(world("plate mismatch", 4))
     result = diagnose(table, read_model("linear"))
@@ -133,6 +134,7 @@ def of_three_axes(table: Table) -> Table:
     return changed(table, {"vz_v": vz, "vz_std_v": table.column("vx_std_v")})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spoilt", [stretch_missing, of_unequal_n, copied, of_one_axis, of_three_axes])
 @pytest.mark.parametrize("subject", first_fast(["samples, clean", "world"]))
 def test_what_the_rig_has_is_named_all_the_same(subject: str, spoilt: Callable[[Table], Table]) -> None:
@@ -155,6 +157,7 @@ def test_an_unlogged_temperature_is_not_called_a_drift_for_certain(subject: str)
         assert "thermometer" in result.next_experiment.why
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("subject", first_fast(["world, clean", "world"]))
 def test_an_unknown_filter_is_no_effect(subject: str) -> None:
     """Correlated samples taken as independent make means look four times too good: they scatter, that is all."""

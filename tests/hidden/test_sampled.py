@@ -43,6 +43,7 @@ CASES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "k"), [*CASES, *before_release(LATE)])
 def test_the_cause_is_named_from_sampled_records(name: str, k: int) -> None:
     for seed in (1, 2)[: 1 + (k == 0)]:  # chance matters where the cause is weak

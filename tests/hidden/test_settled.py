@@ -55,6 +55,7 @@ def test_a_rival_is_judged_with_its_shape_fitted() -> None:
     assert found_on("own/ageing reference", 30, 6166).alternatives == {"bias-drift": ("warm-up-bias",)}
 
 
+@pytest.mark.slow
 def test_a_cause_of_another_form_keeps_a_free_form_for_the_remainder() -> None:
     """Beams that warm as two masses do, where the catalogue has one time constant."""
     found = found_on("own/warming beams", 30, 6158)

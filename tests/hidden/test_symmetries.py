@@ -39,6 +39,7 @@ def with_axes_named_otherwise(table: Table) -> Table:
     return made(columns, table)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SETS)
 def test_the_order_of_rows_and_columns_changes_no_answer(name: str) -> None:
     table = measured(name)

@@ -142,6 +142,7 @@ def test_a_smaller_target_takes_more_turns() -> None:
     assert sum(not is_turn(block.pose) for block in book.blocks) == 13
 
 
+@pytest.mark.slow
 def test_a_clumsy_hand_is_not_worse() -> None:
     clumsy = Hand(slips=0.3, errs=0.15, clings=0.3, patience_s=5.0, table_deg=5.0, tremor_deg=0.8)
     assert turns_by_procedure(4, clumsy).worst < 3e-3

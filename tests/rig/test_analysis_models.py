@@ -130,6 +130,7 @@ def test_one_value_for_all_axes_is_freed(rig: Rig, data: str, tmp_path: Path) ->
     assert not any(term.tied for term in read_model(out).terms)
 
 
+@pytest.mark.slow
 def test_an_effect_of_ones_own_is_shown_found_added_and_read_again(
     rig: Rig, own: tuple[str, ...], tmp_path: Path
 ) -> None:

@@ -62,6 +62,7 @@ def run(swept: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> str:
         return record.runs()[0].run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_each_sensor_gets_its_own_calibration(rig: Rig, run: str, tmp_path: Path, name: str) -> None:
     ended = rig("fit", f"{run}/{name}", "--model", "physical", "--out", str(tmp_path / "model.yaml"), "--json")

@@ -95,6 +95,7 @@ def test_check_identifies_and_tests_every_instrument(rig: Rig) -> None:
     assert "FAILED" not in rig("check").out
 
 
+@pytest.mark.slow
 @pytest.mark.sockets
 def test_check_fails_for_an_instrument_that_does_not_answer(rig: Rig, bench_file: Callable[..., Path]) -> None:
     instruments = yaml.safe_load(DEFAULT.read_text())["instruments"]

@@ -135,6 +135,7 @@ def test_a_procedure_runs_with_each_digital_sensor(
             assert scale["value"] == pytest.approx(9.80665, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.sockets
 @pytest.mark.parametrize("driver", list(FRAMED))
 def test_a_few_poses_with_each_digital_sensor_keep_their_losses(

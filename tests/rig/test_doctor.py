@@ -50,6 +50,7 @@ def test_without_any_run_all_checks_pass(rig: Rig, tmp_path: Path) -> None:
     assert (ended.status, all(check["ok"] for check in ended.document["checks"].values())) == (0, True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("package", ["numpy", "sqlalchemy", "yaml"])
 def test_a_package_that_cannot_be_imported_is_named_in_an_archive(tmp_path: Path, package: str) -> None:
     (tmp_path / f"{package}.py").write_text("raise ImportError('a damaged file')")

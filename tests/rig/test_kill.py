@@ -74,6 +74,7 @@ def test_kills_of_other_procedures(nursery: Nursery, tmp_path: Path, words: tupl
     assert survived.total() >= 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("table", "number", "poses"),
     first_fast(

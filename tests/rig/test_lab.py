@@ -41,6 +41,7 @@ def reader(people: Server, database: str, monkeypatch: pytest.MonkeyPatch) -> st
     return people.url(database, "anna")
 
 
+@pytest.mark.slow
 def test_an_imported_table_reads_the_same_from_the_lab(
     rig: Rig, work: Path, writer: str, reader: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

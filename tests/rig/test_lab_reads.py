@@ -120,6 +120,7 @@ def _undated(text: bytes | None) -> bytes:
     return b"".join(line for line in (text or b"").splitlines(True) if not line.startswith(b"  created: "))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("what", "words"), [(key[0], words) for key, words in ASKED.items()], ids=map(" ".join, ASKED))
 def test_a_command_prints_and_writes_the_same_from_either_record(
     both: Callable[..., None], laboratory: Laboratory, undrawn: None, what: str, words: tuple[str, ...]

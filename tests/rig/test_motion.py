@@ -59,6 +59,7 @@ def few_swings(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("procedures.motion.SWINGS_DEG", (90.0,))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", first_fast([1, 2, 3]))
 def test_the_physical_model_reaches_the_limit_that_noise_sets(seed: int, rig_home: Path) -> None:
     with Record() as record:
@@ -114,6 +115,7 @@ def test_a_bench_without_its_instruments_is_refused_before_anything_moves(golden
         plan(Bench.model_validate(document), MOTION, parse(MOTION, {}))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reversed_channels", first_fast([False, True]))
 def test_a_motion_run_holds_three_tables(rig_home: Path, few_swings: None, reversed_channels: bool) -> None:
     document = bench(QUIET).document()
@@ -178,6 +180,7 @@ class StopsAt(Onlooker):
             raise KeyboardInterrupt("SIGINT")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("stops", "lengths_s"),
     [

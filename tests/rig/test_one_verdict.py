@@ -119,6 +119,7 @@ def answers(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     return Answers(str(path), folder)
 
 
+@pytest.mark.slow
 def test_all_commands_and_the_page_agree_on_a_file(answers: Answers) -> None:
     agree(answers)
     assert (answers.document("diagnose")["verdict"] == "unexplained") is ("unexplained" in answers.data)
@@ -157,6 +158,7 @@ def agree(answers: Answers) -> None:
     assert comparison["rmse"].keys() == comparison["noise_floor"].keys()
 
 
+@pytest.mark.slow
 def test_commands_and_report_print_the_same_verdict(answers: Answers, undrawn: None) -> None:
     diagnosis = answers.session[1][0].judgement
     assert diagnosis.text in answers.text("diagnose")

@@ -69,6 +69,7 @@ def test_only_what_is_complete_is_pushed(own: Record, lab: Record) -> None:
     assert [each.run for each in pushed(own, lab.where)] == [stopped]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small_batches")
 def test_wherever_the_wire_is_cut_all_arrive_once(own: Record, lab: Record, server: Server, database: str) -> None:
     runs = [a_run(own, seed) for seed in range(3)]

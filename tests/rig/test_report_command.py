@@ -27,6 +27,7 @@ def data(tmp_path: Path) -> str:
     return str(tmp_path / "warm.csv")
 
 
+@pytest.mark.slow
 def test_the_report_command_writes_a_page_and_pictures(rig: Rig, data: str, tmp_path: Path) -> None:
     out, folder = tmp_path / "page.html", tmp_path / "pictures"
     ended = rig("report", data, "--model", "linear", "--out", str(out), "--pictures", str(folder), "--json")

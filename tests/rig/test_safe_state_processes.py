@@ -114,6 +114,7 @@ def test_a_second_controller_is_refused_before_anything_is_sent(
         assert first.wait(timeout=30) == 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("blow", [signal.SIGKILL, signal.SIGSTOP], ids=["dies", "stalls"])
 def test_a_stage_stops_when_its_controller_is_killed_in_mid_move(blow: signal.Signals) -> None:
     """In real time: the drive hears nothing for half a second, and brakes."""

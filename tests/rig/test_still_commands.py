@@ -137,6 +137,7 @@ def test_a_run_straight_from_its_record(rig: Rig, rig_home: Path, tmp_path_facto
     assert density == pytest.approx(dict.fromkeys("xy", 1.126e-4), rel=0.1)  # 0.775 mV behind 15.07 Hz (Ang V)
 
 
+@pytest.mark.slow
 def test_flicker_and_hum_of_the_simulated_world_are_found_through_its_sockets(
     rig: Rig, folder: Path, monkeypatch: pytest.MonkeyPatch, bench_file: Callable[..., Path]
 ) -> None:
@@ -256,6 +257,7 @@ def test_no_legend_names_a_thing_twice(rig: Rig, folder: Path) -> None:
     assert "measured, after removing non-noise signals" not in shown["white-report", "allan"]
 
 
+@pytest.mark.slow
 def test_a_ramp_at_rest_is_calibrated_in_less_than_ten_lines(rig: Rig, folder: Path) -> None:
     volts, warm = record(np.random.default_rng(5), line=5e-4, glue=4e-3)
     rows = np.column_stack([np.arange(len(volts)), volts, warm])

@@ -60,6 +60,7 @@ def only_run() -> tuple[Run, list[str | None]]:
         return run, [kept.excluded for kept in record.kept(run.run)]
 
 
+@pytest.mark.slow
 def test_a_guided_run_asks_shows_and_ends() -> None:
     """A refusal is no end."""
     with at_terminal("run", "sweep", *SMALL_ARGUMENTS) as terminal:
@@ -124,6 +125,7 @@ ENDS: dict[str, Callable[[pexpect.spawn[str]], object]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("end", first_fast(ENDS))
 def test_the_menu_ends_a_run_that_can_be_resumed(end: str) -> None:
     with begun(*LONG) as terminal:

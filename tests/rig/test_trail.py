@@ -84,6 +84,7 @@ def test_an_effect_of_ones_own_is_tried_like_any_other(turned: ModelSession) -> 
         turned.written("bias", "a*sin(5*beta)")
 
 
+@pytest.mark.slow
 def test_the_name_of_a_removed_effect_is_free_and_its_searches_are_forgotten(turned: ModelSession) -> None:
     first = turned.written("mine", "a*az")
     grown = turned.with_own(first)

@@ -65,6 +65,7 @@ def test_a_fit_of_a_single_turn_lists_the_effects_that_it_cannot_show(rig: Rig, 
     assert "hard-iron is not fitted: the orientations cover too little of the sphere" in refused.err
 
 
+@pytest.mark.slow
 def test_every_command_takes_a_gyroscope(rig: Rig, gyroscope: str, tmp_path: Path) -> None:
     model = str(tmp_path / "found.yaml")
     said = rig("discover", gyroscope, "--out", model, "--json")

@@ -309,6 +309,7 @@ def test_a_visit_ends_its_searches_and_its_steps(tmp_path: Path, monkeypatch: py
         make_report(Request(two_faults(tmp_path), "linear"), print, visits[0].searched)
 
 
+@pytest.mark.slow
 def test_a_report_drawn_ahead_draws_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     desk, data = Desk(None), two_faults(tmp_path)
     with closing(desk):
@@ -322,6 +323,7 @@ def test_a_report_drawn_ahead_draws_nothing(tmp_path: Path, monkeypatch: pytest.
     assert "drawn here" not in text
 
 
+@pytest.mark.slow
 def test_the_first_visit_after_a_search_draws_its_report_ahead(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     desk, data, drawn = Desk(DEFAULT), two_faults(tmp_path), list[str]()
     monkeypatch.setattr("rig.web.pages.model.draw_ahead", lambda _, data, __: drawn.append(data))
@@ -338,6 +340,7 @@ def test_the_first_visit_after_a_search_draws_its_report_ahead(tmp_path: Path, m
     assert drawn == [data]
 
 
+@pytest.mark.slow
 def test_the_first_analysis_loads_no_machine_code(tmp_path: Path) -> None:
     words = [sys.executable, "-c", FIRST_ANALYSIS, hidden(tmp_path, "package turned")]
     ended = subprocess.run(words, capture_output=True, text=True, check=True)

@@ -68,6 +68,7 @@ def test_flicker_noise_averages_out_slowly() -> None:
     assert 0.5 < long / short < 2.0  # white noise would fall by 4.5, a random walk rise by 4.5
 
 
+@pytest.mark.slow
 def test_a_random_walk_spreads_with_the_square_root_of_time() -> None:
     spreads = []
     for seed in range(100):

@@ -98,6 +98,7 @@ def test_a_walk_rises_with_the_root_of_time() -> None:
     assert mean_oadev(0.5, 20_000, taus, walk_v_per_sqrt_h=1e-3) == pytest.approx(expected, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("time_s", "interval_s", "edges"), [
     (20.0, 2.0, (1e-3, 8e-3, 2e-2, 5e-2)),
     (0.05, 1e-3, (0.1, 1.0, 5.0, 20.0)),
