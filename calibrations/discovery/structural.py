@@ -355,11 +355,11 @@ def _first(start: Fit, steps: list[Step[Fit]], ranked: Sequence[RowCandidate]) -
 
 
 def structure(start: Fit, effects: Mapping[str, Effect], before: Structure | None = None) -> Structure:
-    """The places that act beyond the model of `start`, in the noise that an earlier structure found in its residual."""
-    of_residual = before is not None and before.floor_source is not FloorSource.SAMPLES
-    white = before.white if before is not None and of_residual else start.problem.white
-    geometry = _geometry_effects(start, effects)
-    return find_structure(start.table, white, effects_beyond_base(start), geometry, of_residual)
+    """The places that act beyond the model of `start`, in the noise that the structure `before` found, if it did."""
+    white, source = start.problem.white, FloorSource.SAMPLES
+    if before is not None and before.floor_source is not source:
+        white, source = before.white, before.floor_source
+    return find_structure(start.table, white, effects_beyond_base(start), _geometry_effects(start, effects), source)
 
 
 def residual_beside_places(start: Fit) -> float:

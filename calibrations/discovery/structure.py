@@ -189,17 +189,17 @@ def poorly_predicted(fit: Fit) -> Pattern | None:
     visited many times, this cross-validation over rows leaves out no pose.
     """
     seen = max(fit.pooled_excess, 1.0)
+    few = fit.table.type.stage_angles and repeats_few_poses(fit.table)
     if fit.table.type.moving and fit.held_out_excess > MOST_UNSEEN:
         rows = "stretches"
     elif (
         fit.table.type.stage_angles
         and fit.held_out_excess > MOST_UNSEEN * seen
-        and (fit.cross_validated_excess > MATERIAL * seen or repeats_few_poses(fit.table))
+        and (few or fit.cross_validated_excess > MATERIAL * seen)
     ):
         rows = "poses"
     else:
         return None
-    few = rows == "poses" and repeats_few_poses(fit.table)
     advice = "; these rows are at few poses: measure at more orientations" if few else ""
     text = f"the error on unseen {rows} is {fit.held_out_excess:.2g} times the noise floor{advice}"
     return Pattern(text, np.zeros((0, 0, 0)))

@@ -19,7 +19,7 @@ from calibrations.fitting.solution import Solution
 from calibrations.free_forms.bases import Harmonics, Line
 from calibrations.free_forms.chain import ModelEffects, State, start, state_at
 from calibrations.free_forms.components import Component, free
-from calibrations.free_forms.descent import SLOW_BEGIN, SLOW_MOST, Point, SearchResult, Setting, finish
+from calibrations.free_forms.descent import SLOW_BEGIN, SLOW_MOST
 from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.form import Factor, Form
 from calibrations.free_forms.geometry import GEOMETRY, Geometry
@@ -27,6 +27,7 @@ from calibrations.free_forms.places import components
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.reml import coefficients, estimate, gains, scale_components
 from calibrations.free_forms.requested import RequestedForm
+from calibrations.free_forms.search_result import Point, SearchResult, Setting, finish
 from calibrations.free_forms.selection import ENTER, select
 from calibrations.free_forms.structure import FloorSource, Structure
 from calibrations.model import Model

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc  # scipy.stats takes 0.4 s to load
 
-from calibrations.free_forms.descent import SearchResult
 from calibrations.free_forms.jumps import STEPS
 from calibrations.free_forms.naming import Curves, all_walk, causes_of_place, project_off
 from calibrations.free_forms.place_names import HISTORY
 from calibrations.free_forms.rivals import gain_and_rivals, replacements_of
+from calibrations.free_forms.search_result import SearchResult
 from calibrations.table import Array
 
 LEAST_SIZE = 0.6  # noise floors: a smaller place is a refinement

@@ -19,8 +19,8 @@ import numpy as np
 
 from calibrations.criteria import FORM_PART
 from calibrations.free_forms.chain import Coefficients, ModelEffects, own_base_size, state_at
-from calibrations.free_forms.descent import SearchResult
 from calibrations.free_forms.form import CROSS
+from calibrations.free_forms.search_result import SearchResult
 from calibrations.geometry.orientation import out_of_plane
 from calibrations.table import Array
 

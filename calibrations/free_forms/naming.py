@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from calibrations.free_forms.components import Component
-from calibrations.free_forms.descent import SearchResult
+from calibrations.free_forms.search_result import SearchResult
 from calibrations.free_forms.shapes import climb
 from calibrations.table import Array
 

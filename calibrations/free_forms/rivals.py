@@ -8,9 +8,9 @@ import numpy as np
 
 from calibrations.free_forms.chain import Coefficients
 from calibrations.free_forms.components import Component
-from calibrations.free_forms.descent import SearchResult
 from calibrations.free_forms.jumps import STEPS
 from calibrations.free_forms.reml import Sizes, gain_of_columns, gains
+from calibrations.free_forms.search_result import SearchResult
 
 CLOSE = 10.0  # of -2 log likelihood: the data cannot separate two causes that differ by less
 MOSTLY = 0.85  # of a place's gain: a form at a larger place that gains more may be its form

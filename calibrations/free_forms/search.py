@@ -13,20 +13,13 @@ from collections.abc import Callable, Mapping, Set
 from dataclasses import replace
 
 from calibrations.free_forms.chain import ModelEffects
-from calibrations.free_forms.descent import (
-    CONVERGED,
-    NOISE_ALONE,
-    SLOW_MOST,
-    SearchResult,
-    Setting,
-    descend,
-    take_damped_step,
-)
+from calibrations.free_forms.descent import CONVERGED, SLOW_MOST, descend, take_damped_step
 from calibrations.free_forms.jumps import STEPS
 from calibrations.free_forms.place_names import HISTORY
 from calibrations.free_forms.places_in_time import slow_noise
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.reml import coefficients, estimate
+from calibrations.free_forms.search_result import NOISE_ALONE, SearchResult, Setting
 from calibrations.free_forms.selection import SPILL
 from calibrations.table import Array
 

@@ -15,12 +15,12 @@ from calibrations.criteria import LARGER_NOISE, LEAST_NOISE, SIGNIFICANT
 from calibrations.free_forms.acting_places import ActingPlace, places
 from calibrations.free_forms.bases import Line
 from calibrations.free_forms.chain import Coefficients, ModelEffects
-from calibrations.free_forms.descent import SearchResult
 from calibrations.free_forms.form import CROSS, Form
 from calibrations.free_forms.geometry import LINEAR_PART, Geometry, GeometryEffects, geometry
 from calibrations.free_forms.place_names import HISTORY, place_of_effect
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.search import search
+from calibrations.free_forms.search_result import SearchResult
 from calibrations.free_forms.selection import ENTER
 from calibrations.free_forms.stairs import SAW, Stairs
 from calibrations.geometry.orientation import out_of_plane
@@ -248,23 +248,22 @@ def find_structure(
     white: Array | None,
     model_effects: ModelEffects,
     effects: GeometryEffects,
-    of_residual: bool = False,
+    source: FloorSource = FloorSource.SAMPLES,
 ) -> Structure:
     """Places that act in poses, rows in order of time.
 
     white    standard deviation of each mean, (channels, n); None where it is not known
     model_effects    effects of the given model beyond bias, scale factor and geometry
     effects  those of the geometry
-    of_residual  whether `white` is the noise that an earlier search of these rows found in its residual
+    source   where `white` is known from: noise that an earlier search of these rows found is not asked again
     """
-    data = PoseData.of(table)
-    source = FloorSource.SAMPLES
+    data, found_before = PoseData.of(table), source is not FloorSource.SAMPLES
     if white is None:
         white, source = _neighbours(data), FloorSource.NEIGHBOURS
     usual = np.sqrt(np.mean(white**2, axis=1, keepdims=True))
     if np.any(noiseless := white < NO_NOISE * usual):  # these rows have less noise than others, and contradict nothing
         result = search(data, np.where(noiseless, LEAST_WHITE * usual, white), model_effects)
-    elif of_residual or SAW in table.left_out:  # what the stairs hide of each row is never the same for all
+    elif found_before or SAW in table.left_out:  # what the stairs hide of each row is never the same for all
         result = search(data, white, model_effects)
     else:
         result, source = _search_with_noise(data, white, model_effects, source)

@@ -15,10 +15,10 @@ from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import fit
 from calibrations.free_forms.bases import Steps
 from calibrations.free_forms.chain import ModelEffects
-from calibrations.free_forms.descent import Setting
 from calibrations.free_forms.effect import FreeForm
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.rivals import gain_and_rivals
+from calibrations.free_forms.search_result import Setting
 from calibrations.model.file import read_model
 from calibrations.table import Array, Table
 from tests.calibrations import synthetic

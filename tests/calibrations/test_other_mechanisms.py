@@ -10,9 +10,9 @@ from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit
 from calibrations.free_forms.acting_places import places
 from calibrations.free_forms.chain import ModelEffects, start
-from calibrations.free_forms.descent import Point, Setting, finish
 from calibrations.free_forms.places import components
 from calibrations.free_forms.poses import PoseData
+from calibrations.free_forms.search_result import Point, Setting, finish
 from calibrations.loop import dataset
 from calibrations.model.file import read_model
 from calibrations.table import Array
