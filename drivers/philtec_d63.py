@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import scipy  # its room of interpolation is loaded where it is first entered
+import scipy  # scipy.interpolate loads slowly: it is imported at its first use
 import yaml
 from numpy.typing import ArrayLike, NDArray
 

@@ -17,7 +17,7 @@ from textwrap import wrap
 from typing import Any
 
 import numpy as np
-import scipy  # its room of statistics is loaded where it is first entered
+import scipy  # scipy.stats loads slowly: it is imported at its first use
 
 from calibrations.compensation.cost import ErrorSize
 from calibrations.compensation.forward import FORCES, INVERTED, LEFT_OUT, NOISE, OF_THE_RIG

@@ -17,7 +17,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-import scipy  # its room of optimization is loaded where it is first entered
+import scipy  # scipy.optimize loads slowly: it is imported at its first use
 
 from calibrations.criteria import (
     EXCITED_G,

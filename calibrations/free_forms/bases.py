@@ -14,7 +14,7 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-import scipy  # its room of interpolation is loaded where it is first entered
+import scipy  # scipy.interpolate loads slowly: it is imported at its first use
 from numpy.typing import NDArray
 from scipy.special import ndtr
 

@@ -18,7 +18,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-import scipy  # its room of interpolation is loaded where it is first entered
+import scipy  # scipy.interpolate loads slowly: it is imported at its first use
 from numpy.typing import ArrayLike
 
 from calibrations.criteria import LONGEST_GAP_DEG, POINT_REACH_DEG

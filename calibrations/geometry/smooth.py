@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 
 import numpy as np
-import scipy  # its room of linear algebra is loaded where it is first entered
+import scipy  # scipy.linalg loads slowly: it is imported at its first use
 
 from calibrations.geometry.orientation import reported_force
 from calibrations.table import Array, Table

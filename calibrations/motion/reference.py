@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy  # its room of optimization is loaded where it is first entered
+import scipy  # scipy.optimize loads slowly: it is imported at its first use
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from calibrations.criteria import FEWEST_MOTION_PERIODS, HIGHEST_MOTION, HIGHEST_MOTION_HZ, MOST_SINES, PROMINENT
