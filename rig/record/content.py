@@ -31,7 +31,7 @@ ORDER = {
     events: events.c.event,
 }
 DATABASE_NUMBERS = (events.c.event, log.c.line)  # numbers given by the database
-START_COLUMNS = ("run", "procedure", "created", "configuration", "source", "identities")  # set at the begin of a run
+START_COLUMNS = ("run", "procedure", "created", "configuration", "source", "identities")  # set when a run begins
 
 
 def digest(connection: Connection, run: str) -> str:
@@ -61,7 +61,7 @@ def run_row(connection: Connection, run: str) -> Row[Any]:
 
 
 def uid_of(connection: Connection, run: str) -> str:
-    """The identifier of a run in every record. For a run of an older program it is derived from its begin."""
+    """The identifier of a run in every record. For a run of an older program it is derived from START_COLUMNS."""
     row = connection.execute(select(runs).where(runs.c.run == run)).one()._mapping
     return row["uid"] or hashlib.sha256(_line([row[name] for name in START_COLUMNS])).hexdigest()[:32]
 

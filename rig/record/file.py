@@ -118,7 +118,7 @@ def _require_log(connection: Any, info: dict[str, Any], path: Path, notify: Call
 def _save_rows(connection: Any, info: dict[str, Any], path: Path, notify: Callable[[str], None]) -> bool:
     """Copy the rows of a removed write-ahead log into the record. Returns False if that fails.
 
-    A record that was removed or exchanged itself is found at the begin of the next transaction.
+    A record that was removed or exchanged itself is found at the beginning of the next transaction.
     """
     if (
         connection is None

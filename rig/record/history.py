@@ -1,4 +1,4 @@
-"""The history of a run: its events, and each begin, stop, resume and end, which its log has."""
+"""The history of a run: its events, and from its log each start, stop, resume and end."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ERROR = re.compile(r"(\w+): (?:stopped )?(.*?)(?:; `rig resume [^`]*` continues 
 
 
 def history(record: Record, run: str) -> list[Event]:
-    """All events of `run` with its begin, stops, resumes and end, in the order of time."""
+    """All events of `run` with its start, stops, resumes and end, in the order of time."""
     return sorted([*record.events(run), *_turns(record.lines(run, TURNS))], key=lambda event: event.at)
 
 
@@ -33,7 +33,7 @@ def interruptions(record: Record, run: str) -> str:
 
 
 def _turns(lines: Iterable[Line]) -> list[Event]:
-    """Begins, stops and ends. A stop has its reason, and whether all instruments are at rest."""
+    """Starts, stops and ends. A stop has its reason, and whether all instruments are at rest."""
     turns: list[Event] = []
     for line in lines:
         previous = turns[-1].what if turns else ""

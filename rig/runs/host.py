@@ -180,7 +180,7 @@ class RunHost:
 
 
 def _zero_s(rig: Rig, run: Run) -> float:
-    """The clock's time at t = 0: the time of power-on or, if unknown, the begin of the run."""
+    """The clock's time at t = 0: the time of power-on or, if unknown, the start of the run."""
     powered_s = rig.power_on_s()
     if powered_s is not None:
         return powered_s

@@ -203,7 +203,7 @@ def _carry_out(
 
 
 def _note_program(record: Record, run: Run, procedure: Procedure, log: Callable[[str, str], None]) -> None:
-    """Log the version of the program and the digest of the procedure. An event marks the begin of another one."""
+    """Log the version of the program and the digest of the procedure. An event marks the change to another one."""
     digest = hashlib.sha256(procedure.path.read_bytes()).hexdigest()[:16]
     present = f"{program()}, procedure {procedure.name} {digest}"
     previous = next((line.text for line in reversed(record.lines(run.run, (PROGRAM,)))), present)
@@ -274,7 +274,7 @@ def _perform(
 
 
 def _require_same_instruments(run: Run, rig: Rig) -> None:
-    """Raises RunMismatch if an instrument was exchanged since the begin of the run."""
+    """Raises RunMismatch if an instrument was exchanged since the run began."""
     for role, identity in rig.identities().items():
         if asdict(identity) != run.identities.get(role):
             raise RunMismatch(

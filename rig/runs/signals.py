@@ -147,7 +147,7 @@ SHOWN_BYTES = 64  # of one message: of a stream packet, the header and the first
 
 
 class Trace:
-    """Writes every message to and from instruments into the log of the run, also messages before its begin."""
+    """Writes every message to and from instruments into the log of the run, also messages before the run begins."""
 
     def __init__(self, record: Record) -> None:
         self._record = record

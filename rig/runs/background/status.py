@@ -25,7 +25,7 @@ from rig.runs.observer import RunViewer, values
 from rig.runs.signals import ON_A_PAGE, stop_source
 
 FOLDER = "apart"
-KEY_TIME = "%Y%m%d-%H%M%S-%f"  # of the begin of a process, UTC
+KEY_TIME = "%Y%m%d-%H%M%S-%f"  # start time of a process, UTC
 
 
 @dataclass(frozen=True)
