@@ -151,9 +151,9 @@ class SimulatedClock:
     def _wait_arrival(self, wire: Wire, count: int) -> bool:
         """Wait until all that was emitted can be read at once: how the kernel cuts it up must not matter.
 
-        A backlog comes as the kernel has room: one that is longer than one read, or one for which the kernel opens no
-        window before something is read. Of a connection that has ended nothing is to come. False if the kernel has
-        dropped all of it, which is counted no longer.
+        A backlog that is longer than one read arrives in parts, as does one for which the kernel opens no window before
+        something is read. Returns True then as well: the rest arrives after the next read. A `count` of 0 is the end of
+        the connection. Returns False if the kernel has dropped all of it; these bytes no longer count as in flight.
         """
         begin_s = growth_s = time.monotonic()
         pending = 0
@@ -195,7 +195,7 @@ def step(peers: Sequence[Peer], now_s: float) -> None:
 def serve_forever(
     peers: Sequence[Peer], is_over: Callable[[], bool] = lambda: False, clock: Clock | None = None
 ) -> None:
-    """Serve any client in real time until `until()` is true, with the servers that a simulated clock uses too.
+    """Serve any client in real time until `is_over()` is true, with the servers that a simulated clock uses too.
 
     `clock` starts at the time of the servers' world; by default at 0.
     """

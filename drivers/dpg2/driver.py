@@ -1,13 +1,14 @@
 """MEAS/TE DPG2: digital level with two axes, at 9600 8N1.
 
-After power-on it talks unasked: `X=+01.234` CR LF `Y=-00.007` CR LF, in deg, again and again. Commands are single
-letters without an end of line: `s` stop (echoed), `S` start; when stopped `R` one reading, `V` version and serial.
+After power-on it sends readings without a request: `X=+01.234` CR LF `Y=-00.007` CR LF, in deg, again and again.
+Commands are single letters without an end of line: `s` stop (echoed), `S` start; when stopped `R` one reading, `V`
+version and serial.
 
-The driver stops it and asks for readings one by one. It takes the next whole pair of lines whatever comes before it,
-so a line joined in the middle, an echo inside one, or a level that did not hear the stop do no harm.
+The driver stops it and asks for readings one by one. It takes the next whole pair of lines and ignores the bytes before
+it: a part of a line, an echo inside a line, and lines of a level that did not receive the stop.
 
-Source: instruction manual of the DPG series, July 2015, 6.1 and 6.2. Beyond its range it shows `+++++++` or `-------`:
-so the manual of the same maker's P series, 5.7.4.2; for the DPG2 this is from memory, like its range.
+Source: instruction manual of the DPG series, July 2015, 6.1 and 6.2. Beyond its range it shows `+++++++` or `-------`
+by the manual of the same maker's P series, 5.7.4.2; for the DPG2 this is from memory, like its range.
 """
 
 from __future__ import annotations
@@ -96,7 +97,7 @@ class Level:
         Raises:
             NotSettled: the level still swings when the patience is over.
             InstrumentError: it is beyond its range, or its reading has stuck.
-            LinkTimeout, BadFrame: it is silent, or what comes are no readings.
+            LinkTimeout, BadFrame: it is silent, or it sends bytes that are not readings.
         """
         self._silence()
         deadline, readings = self._clock.now() + self.settings.patience_s, [self._read_once()]

@@ -38,7 +38,7 @@ class Inclinometer(Twin):
         port.answer = self._answer
 
     def advance(self, now_s: float) -> None:
-        """Does nothing: the level is read only when a line is sent, because the converter may still be sampling."""
+        """Apply the fault `restart`. The level is read only when a line is sent: the converter may still sample."""
         if strike := self.faults.once("restart", now_s):
             self._running, self._next_s = True, max(strike.at_s, self._next_s)
 

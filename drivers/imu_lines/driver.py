@@ -1,7 +1,7 @@
-"""A digital sensor that sends lines of text, unasked, over a serial line, TCP or UDP.
+"""A digital sensor that sends lines of text without requests, over a serial line, TCP or UDP.
 
-It is in the role of the converter, and its samples are in the `unit` of the settings in place of V. It is never written
-to. Old lines in the buffers are discarded before a record, and so is a cut line at its start.
+It is in the role of the converter, and its samples are in the `unit` of the settings in place of V. The driver writes
+nothing to it. It discards old lines in the buffers before a record, and an incomplete first line.
 
 With a column `time`, lost samples are found by the gaps of the sensor's time, and repeated ones are dropped. A record
 with more than `most_lost` of its samples lost is refused, as is one with an axis at the end of its range or stuck.

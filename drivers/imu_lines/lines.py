@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import reduce
 from operator import xor
+from typing import NoReturn
 
 TIME = "time"  # name of the column of the sensor's own time
 PAIR = re.compile(r"([A-Za-z_][\w.]*)\s*[:=]\s*([-+]?[\d.][\d.eE+-]*)")
@@ -64,7 +65,7 @@ def _check_line(line: str) -> str:
     return text
 
 
-def _refuse_line(line: str) -> dict[Column, float]:
+def _refuse_line(line: str) -> NoReturn:
     raise ValueError(f"{line!r} has no number")
 
 

@@ -77,9 +77,9 @@ def _columns_by_name(values: Mapping[Column, NDArray[np.float64]]) -> dict[str, 
     """Our name for each known column."""
     columns: dict[str, Column] = {}
     for column in values:
-        match = next((m for pattern, _ in NAMES if (m := re.match(pattern, str(column).lower()))), None)
-        name = next((name for pattern, name in NAMES if re.match(pattern, str(column).lower())), "")
-        if match and name:
+        matches = ((re.match(pattern, str(column).lower()), name) for pattern, name in NAMES)
+        match, name = next(((match, name) for match, name in matches if match), (None, ""))
+        if match is not None:
             columns.setdefault(name if name in (TIME, TEMPERATURE) else f"{name}{match[2]}", column)
     return columns
 

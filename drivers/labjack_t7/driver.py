@@ -2,7 +2,7 @@
 
 A record comes as a stream, clocked by the device; never sample by sample. Every record is checked for
 lost scans and turned into volts with the calibration that the device carries.
-Source: T-series datasheet; see labjack_t7_table and labjack_t7_stream.
+Source: T-series datasheet; see the modules `registers` and `stream`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from drivers.transport.modbus import REPEATED, RETRIES, Register, Unit
 class Settings(Inputs[int]):
     """Channels as {name: AIN number}, in the order of the scan; one range for all.
 
-    Those `on_request` are wired too, and are sampled only for who asks for them, see `T7.only`.
+    Those `on_request` are wired too, and are sampled only if a procedure asks for them, see `T7.only`.
     `interchannel_s` is from one channel of a scan to the next [M: measure it with one signal on two channels].
     `interlocks` are the digital lines of contacts that must be closed while anything moves, as {name: DIO number}. A
     closed contact pulls its line to ground; an open one, or a broken wire, lets it go high.

@@ -1,8 +1,8 @@
 """LabJack T7: the receiving end of a running stream, from bytes to scans.
 
 It waits in bounded time: bytes are due at the rate of the stream, and a device that is late by PATIENCE_S is silent.
-One whose last bytes come late, though none is missing, has not sampled all the time: its clock stood still, or it left
-out scans and did not tell. So the end of what is asked for is compared with the computer's own clock.
+If no byte is missing but the last ones come late, the device did not sample all the time: its clock stopped, or it
+skipped scans without a report. Therefore the arrival of the last requested scan is compared with the computer's clock.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""PI E-727 controller with a P-611.3S NanoCube: places and oscillations in um, GCS 2.0 over TCP or a serial line.
+"""PI E-727 controller with a P-611.3S NanoCube: positions and oscillations in um, GCS 2.0 over TCP or a serial line.
 
 Safe by design: limits are checked before anything is sent, arrival is measured and not assumed, every command
-is followed by `ERR?`, and a stop can always be sent. Source: see pi_e727_table.
+is followed by `ERR?`, and a stop can always be sent. Source: see the module `parameters`.
 """
 
 from __future__ import annotations

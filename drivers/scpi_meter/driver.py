@@ -5,7 +5,7 @@ The commands are those of SCPI-1999 and of IEEE 488.2; with `timer` also those w
 Without it, the program asks for every scan (`READ?`), which every SCPI multimeter understands, a few times a second.
 
 After each record the driver asks for the instrument's errors (`SYST:ERR?`), so that none passes unseen. A reading of
-9.9E37 is the instrument's word for an overload, and is refused.
+9.9E37 means an overload, and is refused.
 
 Source: SCPI-1999, volume 2, chapters 7.2.1 (9.9E37 is infinity) and 21.8; Keysight 34970A/34972A user's guide and
 34460A/61A/65A/70A operating guide, remote interface reference.
@@ -46,9 +46,9 @@ HINT = "Look the error up in the instrument's manual, and change the settings in
 class Settings(Inputs[int], NoDigitalLines):
     """Channels as {name: input}, such as 101 of a scanner; of an instrument with one input, 0.
 
-    Those `on_request` are wired too, and are measured only for who asks for them. `nplc` is the time of one reading in
-    periods of the mains. `interchannel_s` is from one channel of a scan to the next. `setup` are further commands,
-    sent after those of the driver. `memory` is how many readings the instrument holds.
+    Those `on_request` are wired too, and are measured only if a procedure asks for them. `nplc` is the time of one
+    reading in periods of the mains. `interchannel_s` is from one channel of a scan to the next. `setup` are further
+    commands, sent after those of the driver. `memory` is how many readings the instrument holds.
     Raises ValueError for impossible values.
     """
 

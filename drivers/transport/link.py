@@ -303,7 +303,7 @@ def _open_port(url: Url) -> SocketPort | SerialPort | DatagramPort:
 
 
 def _reason(error: Exception) -> str:
-    """Why a port cannot be opened, without the number of the error and the path, which the message has already."""
+    """Why a port cannot be opened, without error number and path: the message has the path already."""
     number = getattr(error, "errno", None)
     if isinstance(error, serial.SerialException) and number:
         return os.strerror(number)
