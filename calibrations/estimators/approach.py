@@ -108,7 +108,7 @@ class Bank:
             step[:, SLOW + k, SLOW + k] = slow[k]
             noise[:, SLOW + k, SLOW + k] = self.slow[:, k] ** 2 * (1 - slow[k] ** 2)
         noise[:, WALK, WALK] = self.walk**2 * gap_s / HOUR_S
-        step[:, ROOM:, ROOM:], room_variance = _swung(gap_s)
+        step[:, ROOM:, ROOM:], room_variance = _room_transition(gap_s)
         noise[:, range(ROOM, SIZE), range(ROOM, SIZE)] = self.room[:, None] ** 2 * room_variance
         mean[:, REST:LN_TAU] *= decay
         mean[:, SLOW:WALK] *= slow
@@ -116,7 +116,10 @@ class Bank:
         return replace(self, t_s=t_s, belief=Belief(mean, predict(self.belief, step, noise).covariance))
 
     def after(self, t_s: float, value: float, std: float, *, offset: bool = False) -> Bank:
-        """One more value of white standard error `std`; with an `offset`, it is shifted by a constant of its own."""
+        """The bank after one more value of white standard error `std`.
+
+        With `offset`, the value is shifted by a constant that the filters estimate.
+        """
         matrix = np.zeros((1, SIZE))
         matrix[0, [LEVEL, REST, REST + 1, *range(SLOW, ROOM + 1)]] = 1.0
         matrix[0, OFFSET] = float(offset)
@@ -162,8 +165,8 @@ def make_bank(t_s: float, value: float, most: float) -> Bank:
     return Bank(t_s, Belief(mean, covariance), slow, scatter, walk, swings, np.log([m[2] for m in members]))
 
 
-def _swung(gap_s: float) -> tuple[Array, float]:
-    """The transition of a room's swing over a gap, (2, 2), and the new share of its variance."""
+def _room_transition(gap_s: float) -> tuple[Array, float]:
+    """The transition matrix (2, 2) of the room's daily swing over a gap, and the share of its variance that is new."""
     angle, decay = 2 * np.pi * gap_s / DAY_S, np.exp(-gap_s / LASTING_S)
     c, s = np.cos(angle), np.sin(angle)
     return decay * np.array([[c, s], [-s, c]]), 1 - decay**2

@@ -47,13 +47,13 @@ class Correction:
 
 
 def predict(belief: Belief, transition: Array, noise: Array) -> Belief:
-    """One step on: A `transition`, Q `noise`, both (..., n, n)."""
+    """The belief one step later: A `transition`, Q `noise`, both (..., n, n)."""
     covariance = transition @ belief.covariance @ _transpose(transition) + noise
     return Belief((transition @ belief.mean[..., None])[..., 0], (covariance + _transpose(covariance)) / 2)
 
 
 def correct(belief: Belief, measured: Array, matrix: Array, noise: Array) -> Correction:
-    """After `measured` (..., m) = H x + v: H `matrix` (..., m, n), R `noise` (..., m, m)."""
+    """The belief after the measurement `measured` (..., m) = H x + v: H `matrix` (..., m, n), R `noise` (..., m, m)."""
     innovation = measured - (matrix @ belief.mean[..., None])[..., 0]
     cross = belief.covariance @ _transpose(matrix)
     covariance = matrix @ cross + noise
@@ -65,5 +65,5 @@ def correct(belief: Belief, measured: Array, matrix: Array, noise: Array) -> Cor
 
 
 def _transpose(matrix: Array) -> Array:
-    """Transposed."""
+    """The transpose of the last two axes."""
     return np.swapaxes(matrix, -1, -2)

@@ -38,8 +38,7 @@ class Level(NamedTuple):
 def without_scatter(means: Array, readings: int) -> Level:
     """The level below the scatter of a column's means (m,), in which each of `readings` readings holds until the next.
 
-    Frequencies above those of the readings do not show their scatter, and are left
-    out.
+    Frequencies above those of the readings do not show their scatter, and are left out.
     """
     m = len(means)
     k = np.arange(1, min(m, readings))
@@ -52,10 +51,8 @@ def without_scatter(means: Array, readings: int) -> Level:
     smoothed = np.zeros(m)
     smoothed[k] = coefficients * share
     least = np.finfo(float).tiny
-    scatter = np.sum((coefficients * (1 - share)) ** 2) / max(
-        float(np.sum(1 - share)), least
-    )  # of one ordinate, squared
-    errors = scatter * share / m
+    scatter_variance = np.sum((coefficients * (1 - share)) ** 2) / max(float(np.sum(1 - share)), least)  # per ordinate
+    errors = scatter_variance * share / m
     return Level(
         values=np.asarray(idct(smoothed, type=2, norm="ortho")),
         doubt=doubt,
