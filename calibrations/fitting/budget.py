@@ -113,8 +113,11 @@ def row_gains(fit: Fit) -> Array:
 
 
 def _of_type_a(fit: Fit, G: Array, square: float) -> list[Line]:
-    """The fit's own covariance, in its parts. `square`: the part of the residual's squares by the inputs."""
-    noise, rows = fit.noise, fit.residual.size - len(fit.theta)
+    """The lines of type A: the parts of the fit's own covariance.
+
+    `square`: sum of the squares that errors of the inputs leave in the residual. It is not counted twice.
+    """
+    noise, free_rows = fit.noise, float(fit.residual.size - len(fit.theta))
     variances = np.array([np.nan if e.std is None else e.std for e in fit.params.values()]) ** 2
     by_noise = variances / fit.birge**2
     white = np.minimum(np.einsum("pcn,cn->p", G**2, noise.white**2), by_noise)
@@ -123,10 +126,10 @@ def _of_type_a(fit: Fit, G: Array, square: float) -> list[Line]:
     nonwhite_square = float(np.sum(fit.residual**2) - np.sum(noise.white**2))
     share = min(max(1 - square / nonwhite_square, 0.0), 1.0) if square and nonwhite_square > 0 else 1.0
     parts = [
-        ("white noise of the dwells", white, float(rows)),
-        ("scatter from row to row", share * scatter, float(rows)),
+        ("white noise of the dwells", white, free_rows),
+        ("scatter from row to row", share * scatter, free_rows),
         (SLOW_NOISE, share * slow, slow_freedom(noise)),
-        ("misfit of the model", share * misfit, float(rows)),
+        ("misfit of the model", share * misfit, free_rows),
     ]
     return [
         Line(name, "A", "", None, None, np.sqrt(v), freedom)

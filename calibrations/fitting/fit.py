@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from calibrations.errors import ModelError, UnknownName, nearest
-from calibrations.fitting.identifiability import covariance, estimates
+from calibrations.fitting.identifiability import covariance, with_estimates
 from calibrations.fitting.minimise import minimise
 from calibrations.fitting.noise_fit import estimate
 from calibrations.fitting.problem import Problem
@@ -190,9 +190,10 @@ def _requests(model: Model) -> bool:
 
 
 def _with_uncertainties(result: Fit) -> Fit:
+    """The fit with the values and standard uncertainties of its parameters in its model."""
     cautious = result.in_all_noise()
     factors = uncertainty_factors(cautious)
-    model = estimates(result.model, result.problem.layout, result.theta, cautious.information, factors)
+    model = with_estimates(result.model, result.problem.layout, result.theta, cautious.information, factors)
     return replace(result, model=model, all_noise=cautious.noise)
 
 

@@ -45,12 +45,15 @@ def _directions(jacobian: Array, typical: Array) -> tuple[Array, Array, Array]:
     return U[:, determined], root, Vt[~determined] / norm
 
 
-def estimates(model: Model, layout: Layout, theta: Array, jacobian: Array, wider: Array) -> Model:
-    """`model` with a value and a standard uncertainty for every parameter, `wider` by so many times than by noise."""
+def with_estimates(model: Model, layout: Layout, theta: Array, jacobian: Array, factors: Array) -> Model:
+    """`model` with a value and a standard uncertainty for every parameter of `theta` (p,).
+
+    The uncertainties are those of the whitened jacobian (rows, p) times `factors` (p,).
+    """
     if not len(theta):
         return model
     cov, null = covariance(jacobian, layout.typical)
-    std, free = wider * np.sqrt(np.diag(cov)), null.T @ null
+    std, free = factors * np.sqrt(np.diag(cov)), null.T @ null
     by_term: list[list[Estimate]] = [[] for _ in model.terms]
     for k, slot in enumerate(layout.slots):
         reason = _why_not(k, layout, std, free)

@@ -10,6 +10,7 @@ data file has them in its header. A missing constant is unknown, not zero.
     gravity_std_m_s2              gravity at the place
     gain_std, offset_std_v        the converter: relative, and in V
     temperature_std_c             the thermometer's offset
+    rate_std                      speed of the stage of a gyroscope: relative
 
 Gravity counts for values per m/s^2: per local g a scale factor would not depend on it.
 Source  JCGM 100 (GUM) 4.3; JCGM 102 for several outputs.

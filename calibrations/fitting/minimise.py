@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-import scipy  # its room of optimization is loaded where it is first entered
+import scipy  # scipy.optimize loads slowly: it is imported at its first use
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, lstsq, qr
 
@@ -93,16 +93,16 @@ def _white_residual(problem: Problem, noise: Noise, theta: Array) -> Array:
 def _minimise_determined(problem: Problem, noise: Noise, start: Array) -> tuple[Array, float]:
     """Minimise by the shortest Gauss-Newton steps, damped where they fail (Levenberg and Marquardt).
 
-    What the data do not determine stays as it began.
+    Parameters that the data do not determine keep their start values.
     """
     white = partial(_white_residual, problem, noise)
     theta, residual = start, white(start)
     stairs = False
     for _ in range(NEWTON_STEPS):
         slope = np.vstack([noise.whiten(problem.jacobian(theta, stairs=stairs)), problem.layout.prior_rows])
-        candidate, least = newton_step(problem.layout, white, theta, residual, slope)
-        gain = float(residual @ residual - least @ least)
-        theta, residual = candidate, least
+        candidate, candidate_residual = newton_step(problem.layout, white, theta, residual, slope)
+        gain = float(residual @ residual - candidate_residual @ candidate_residual)
+        theta, residual = candidate, candidate_residual
         if gain < SMALL_GAIN * max(1.0, float(residual @ residual) / len(residual)):
             if stairs or not problem.rounds:
                 break
@@ -126,9 +126,9 @@ def newton_step(
     for damping in DAMPINGS:
         solve = partial(_damped, squares, damping) if damping else partial(_shortest, R)
         candidate = theta + typical * _within(solve, low, high)
-        least = white(candidate)
-        if float(residual @ residual - least @ least) > 0:
-            return candidate, least
+        candidate_residual = white(candidate)
+        if float(residual @ residual - candidate_residual @ candidate_residual) > 0:
+            return candidate, candidate_residual
     return theta, residual
 
 
@@ -146,9 +146,10 @@ def _reach(layout: Layout, theta: Array) -> tuple[Array, Array]:
 
 
 def _within(solve: Callable[[Array, NDArray[np.bool_]], Array], low: Array, high: Array) -> Array:
-    """The step within bounds: an entry that a step takes beyond its bound goes there, and no farther.
+    """The step (p,) within bounds: an entry beyond its bound is set to the bound, and the others are solved again.
 
-    solve  the entries of the step that are free, (k,), beside a step (p,) of the others
+    solve  a function of a step (p,) and the mask (p,) of its free entries; it returns the free entries (k,), with the
+           other entries of the step held
     """
     step = np.zeros(len(low))
     free = np.ones(len(step), dtype=bool)

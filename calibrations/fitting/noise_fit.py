@@ -194,8 +194,8 @@ class NoiseSearch:
     def _choose(self, score: Array) -> int:
         """The best point; flicker noise where the data cannot separate it from the best.
 
-        Electronics flickers, and has more to say at long times than one process: steps and trends are then judged
-        with caution.
+        Electronics has flicker noise. At long times it is larger than one process, so that steps and trends are judged
+        with more caution.
         """
         best = int(np.argmin(score))
         flicker = int(np.argmin(np.where(self._flickers, score, np.inf)))
@@ -280,7 +280,7 @@ def _grams(gap_s: Array, fast: Array, columns: Array, grid: list[Point], k: int,
 def scores(g: Grams, other_gram: Array, free: int, least: float) -> tuple[Array, Array]:
     """-2 log restricted likelihood up to a constant, and the factor on all noise (profiled), along the grid.
 
-    `free` rows less smooth columns; the parameters that this channel bears, and not the others, are taken off here.
+    `free`: number of rows without that of the smooth columns. The parameters of this channel alone are subtracted here.
     """
     scale, own_square, other_square, logdet = profile(g.gram, other_gram, free, least)
     return own_square / scale**2 + other_square + g.logdet + g.information + logdet + 2 * free * np.log(scale), scale
@@ -303,7 +303,7 @@ def widening(noise: Noise, residual: Array, jacobian: Array, typical: Array) -> 
     turned = gain(flat.T @ (jacobian / noise.fast[:, :, None]).reshape(residual.size, -1), typical)
     white = noise.whiten(basis)
     white_variance = _variance((white.T @ white)[None], turned)[0]
-    wider = _mean(search, turned) / np.where(white_variance > 0, white_variance, np.inf)
+    wider = _mean_variance(search, turned) / np.where(white_variance > 0, white_variance, np.inf)
     return np.sqrt(np.where(wider > 0, wider, 1.0))  # the variance of an undetermined parameter has no meaning
 
 
@@ -318,8 +318,11 @@ def possible_slow_noise(gap_s: Array) -> list[Point]:
     return [NO_SLOW, *((ratio, taus) for taus in (*single, flicker) for ratio in ALLOWED_RATIOS)]
 
 
-def _mean(search: NoiseSearch, turned: Array) -> Array:
-    """Variance of each parameter in the mean over the grid, channels in turn beside the best of the others."""
+def _mean_variance(search: NoiseSearch, turned: Array) -> Array:
+    """Variance of each parameter, shape (p,): the weighted mean over the grid of noise.
+
+    One channel at a time: the other channels keep their best noise. `turned` (p, k) maps the basis to the parameters.
+    """
     best, grams = search.best(), search.grams
     normal = [g.gram[k, :-1, :-1] / s**2 for g, k, s in zip(grams, best.picks, best.scale, strict=True)]
     joint_variance = _variance(sum(normal[1:], normal[0])[None], turned)[0]

@@ -14,7 +14,7 @@ import numpy as np
 
 from calibrations.effects import Effect
 from calibrations.errors import ModelError
-from calibrations.fitting.shown_forms import estimate_by_residual
+from calibrations.fitting.shown_forms import SMALLEST, estimate_by_residual
 from calibrations.fitting.solution import Solution
 from calibrations.free_forms.bases import Harmonics, Line
 from calibrations.free_forms.chain import ModelEffects, State, start, state_at
@@ -37,7 +37,6 @@ from calibrations.table import Array
 BASE = ("bias", "scale-factor", *GEOMETRY)  # effects whose linear parts the search has in its base
 ROUNDS = 6
 FLOOR_KNOWN = 0.02  # of the noise: a smaller change of a noise that only the residual shows
-SMALLEST = 1e-3  # noise floors: what a form adds that the data do not show
 
 
 def find_requested(model: Model) -> tuple[RequestedForm, ...]:
@@ -116,7 +115,7 @@ def _completing_components(place: str, data: PoseData, first: State) -> list[Com
 def _estimate_forms(
     smaller: Solution, data: PoseData, model_effects: ModelEffects, noise: list[Component], forms: list[Component]
 ) -> SearchResult:
-    """The forms that act, with their sizes; where the noise is not known, that of the residual."""
+    """The forms that act, with their sizes. Unknown white noise is estimated from the residual, in rounds."""
     stated_white = smaller.problem.white
     white = np.tile(smaller.noise.floor[:, None], (1, data.n)) if stated_white is None else stated_white
     for _ in range(ROUNDS):

@@ -102,10 +102,9 @@ def _factors_by_magnitudes(noise: Noise, residual: Array, jacobian: Array, by_ou
         variances.append(level * np.einsum("pn,nm,pm->p", G, K, G))
     weight = np.exp(-(np.array(scores) - min(scores)) / 2) * np.append(len(points) - 1, np.ones(len(points) - 1))
     mean = weight @ np.array(variances) / weight.sum()
-    wider = 1 + stride * (
-        mean / np.where(white_variance > 0, white_variance, np.inf) - 1
-    )  # thinning leaves slow noise, and adds white
-    return np.sqrt(np.where((white_variance > 0) & (wider > 0), wider, 1.0))
+    # all rows have less white variance than the thinned ones and the same slow variance: the excess grows by the stride
+    ratio = 1 + stride * (mean / np.where(white_variance > 0, white_variance, np.inf) - 1)
+    return np.sqrt(np.where((white_variance > 0) & (ratio > 0), ratio, 1.0))
 
 
 def _score(K: Array, r: Array, J: Array, least: float) -> tuple[float, float]:
