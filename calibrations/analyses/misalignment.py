@@ -5,10 +5,10 @@ In the frame that is turned to the bracket's centre, with beta counted from the 
     V = g . a + k_xx a_x^2 + k_yy a_y^2 + k_zz a_z^2 + p sin(beta) + q cos(alpha) cos(beta) + r cos^2(alpha) cos(beta)
       + s t + (v + w a_x) (supply - mean)                        a = (sin alpha cos beta, ..., cos alpha) in g
 
-g / |g| is the axis. p, q: tilt of the base and the stages' levels; p and r hold hysteresis, which comes from either
-side; s: drift. The squares add up to 1, so they hold the bias. In a complete round all columns are orthogonal to g but
-for the supply. What is linear in a load cannot be told from a turn of the axis, wherever it comes from, and is part of
-it.
+g / |g| is the axis. p, q: tilt of the base and zero offsets of the stages; p and r also contain hysteresis, because a
+round approaches its poses from both sides; s: drift. The squares add up to 1, so they contain the bias. In a complete
+round all columns except those of the supply are orthogonal to g. An effect that is linear in a load cannot be separated
+from a rotation of the axis, whatever its cause, and is a part of the result.
 
 Source  Ang (18)-(21); generalised least squares; noise as in `noise_fit`.
 """
@@ -179,7 +179,7 @@ def _bracket(table: Table, axis: str, rounds: list[RowMask]) -> _Bracket:
 def _is_white(brackets: list[_Bracket]) -> bool:
     """Whether white noise explains the residual of both axes, within one standard deviation of its chi-square.
 
-    Slow noise that were always estimated would, where there is none, make the axes look less certain than they are.
+    An estimate of slow noise where there is none would make the axes look less certain than they are.
     """
     if any(bracket.white is None for bracket in brackets):
         return False
@@ -190,9 +190,9 @@ def _is_white(brackets: list[_Bracket]) -> bool:
 
 def _direction(bracket: _Bracket, noise: Noise) -> Direction:
     factors, covariance, _ = bracket.solved(noise)
-    rotation, size = _rotation_about("z", bracket.centre_deg), float(np.linalg.norm(factors[:3]))
-    theta = rotation @ factors[:3] / size
-    slope = (np.eye(3) - np.outer(theta, theta)) @ rotation / size
+    from_bracket, size = _rotation_about("z", bracket.centre_deg), float(np.linalg.norm(factors[:3]))
+    theta = from_bracket @ factors[:3] / size
+    slope = (np.eye(3) - np.outer(theta, theta)) @ from_bracket / size
     return Direction(bracket.axis, theta, slope @ covariance[:3, :3] @ slope.T, bracket.rounds)
 
 

@@ -1,11 +1,18 @@
-"""Bias and scale factor over a cycle of temperature: the slope, and the difference between up and down.
+"""Bias and scale factor of each axis from tumbles, and their coefficients over a cycle of temperature.
+
+A tumble has the four positions of beta at alpha = 90 deg, each reached from below and from above:
+
+    V = B + SF a_x + C a_y      least squares over one tumble, C the cross-axis term; hysteresis is in the scatter
+
+Over a cycle of temperature the slope and the difference between up and down follow from the tumbles:
 
     y = y0 + k (T - T0) + h s [+ d t]     s = 1/2 on the way up, the top included, -1/2 on the way down
 
 d is drift, separable from hysteresis only with more than one cycle. The residual of a straight line (curvature, slow
 noise) widens the standard errors, with few steps by Student's t.
 
-Source  IEEE 1293; JCGM 101, 6.4.9: the standard uncertainty of a t-distribution.
+Source  IEEE 1293, four-point tumble, temperature sensitivity; JCGM 101, 6.4.9: the standard uncertainty of a
+        t-distribution.
 """
 
 from __future__ import annotations
@@ -20,12 +27,6 @@ from calibrations.errors import DataError
 from calibrations.estimators.least_squares import least_squares
 from calibrations.means.noise import rms, white_std
 from calibrations.table import Array, Table
-
-# Bias and scale factor of each axis from tumble tests: the four positions of beta at alpha = 90, up and down.
-#
-#     V = B + SF a_x + C a_y      least squares over one tumble, C the cross-axis term; hysteresis is in the scatter
-#
-# Source  IEEE 1293, four-point tumble.
 
 Rows = NDArray[np.intp]
 OWN_COLUMN = {"x": 0, "y": 1}
@@ -95,7 +96,9 @@ def _tumble(table: Table, axis: str, path: str, rows: Rows) -> Tumble:
     )
 
 
-DIRECTIONS = {"up": 0.5, "down": -0.5}
+# Coefficients over a cycle of temperature.
+
+DIRECTIONS = {"up": 0.5, "down": -0.5}  # s of the formula, by the first word of the path
 
 
 @dataclass(frozen=True)
