@@ -37,7 +37,8 @@ EWMA_WEIGHT = 0.2
 class Chart:
     """One quantity over n runs. Arrays have shape (n,), `ranges` (n - 1,); limits are centre +- reach.
 
-    `judged` is the number of the first run after the baseline; n while the baseline is incomplete.
+    `judged` is the number of baseline runs, and so the number of the first run that is judged; at least n while the
+    baseline is incomplete.
     """
 
     values: Array
@@ -81,7 +82,7 @@ def control_chart(values: Sequence[float], baseline: int = BASELINE_RUNS, least_
     """The chart of `values` in the order of runs; the first `baseline` of them set its limits.
 
     `least_sigma` is the standard uncertainty of one value: sigma is at least this. Raises TooFewRows for fewer than
-    two.
+    FEWEST_RUNS.
     """
     x = np.asarray(values, dtype=np.float64)
     first = x[:baseline]

@@ -33,7 +33,7 @@ DEFAULT_NOISE = 2e-5  # white standard error over the scale factor, where it is 
 DRAWS = 1000
 FORECASTS = 24
 SMALLEST = 1e-12  # of a unit
-LATEST_STEADY_S = 48 * HOUR_S  # from now: a bound beyond it is none
+LATEST_STEADY_S = 48 * HOUR_S  # from now: a later steady state cannot be foreseen
 HORIZON_S = np.concatenate([[0.0], np.geomspace(60.0, 100 * HOUR_S, 60)])
 
 
@@ -65,7 +65,7 @@ class Forecast:
     steady_s: Bounds
     tolerance: float
     change: float  # of the whole approach, by the forecast
-    innovation_ratio: float  # see `Bank.surprise`
+    innovation_ratio: float  # see `Bank.innovation_ratio`
 
     @property
     def known(self) -> bool:
@@ -202,9 +202,12 @@ class ForecastHistory:
 
 
 def steady_time(histories: Mapping[str, ForecastHistory], axis: str = "") -> Bounds | None:
-    """When all quantities of an axis, or of all axes, are steady by the last forecasts, s since power-on: the latest of
-    each bound, infinite beyond FARTHEST_S. None where one of them is no approach."""
-    last = [course.last for name, course in histories.items() if name.endswith(axis)]
+    """The time at which all quantities of an axis, or of all axes, are steady by the last forecasts, s since power-on.
+
+    Each bound is the latest of all quantities, and infinite if it is more than LATEST_STEADY_S after the forecast. None
+    without a forecast, and where a measured drift agrees with no filter.
+    """
+    last = [history.last for name, history in histories.items() if name.endswith(axis)]
     if not last or any(forecast.contradicted for forecast in last):
         return None
     steady_times = [
@@ -214,12 +217,16 @@ def steady_time(histories: Mapping[str, ForecastHistory], axis: str = "") -> Bou
 
 
 def forecast_history(table: Table, oven_c: float = 0.0) -> dict[str, ForecastHistory]:
-    """Forecasts of every quantity of a soak's table by name after LOOKS parts of it, denser at the beginning."""
+    """Forecasts of every quantity of a soak's table, by name.
+
+    There are at most FORECASTS of them, each after a part of the table. They are denser at the beginning, where the
+    drift is fastest.
+    """
     parts = list(soak_parts(table))
-    look_numbers = set(np.rint(np.geomspace(1, len(parts), FORECASTS)).astype(int).tolist()) if parts else set()
+    shown_parts = set(np.rint(np.geomspace(1, len(parts), FORECASTS)).astype(int).tolist()) if parts else set()
     histories: dict[str, list[Forecast]] = {}
     for number, state in enumerate(filter_soak(table, oven_c), 1):
-        for name, forecast in state.forecasts().items() if number in look_numbers else ():
+        for name, forecast in state.forecasts().items() if number in shown_parts else ():
             earlier = histories.setdefault(name, [])
             if not earlier or earlier[-1].t_s < forecast.t_s:
                 earlier.append(forecast)

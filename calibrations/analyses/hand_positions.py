@@ -2,7 +2,7 @@
 
 The positions suffice when the standard uncertainty of every parameter, as an error at full scale (1 g), is at most the
 wanted one. It comes from a fit to the positions so far. A fit that misses more than the noise is less certain, so a
-slipped or shaken position costs more positions.
+sensor that slipped or was shaken costs more positions.
 
 Source  Tedaldi, Pretto and Menegatti, ICRA 2014: calibration of a triad from positions of unknown orientation.
 """
@@ -17,7 +17,7 @@ from typing import Protocol
 
 import numpy as np
 
-from calibrations.analyses.stillness import NoiseAtRest
+from calibrations.analyses.stillness import BLOCK_S, NoiseAtRest
 from calibrations.design.orientations import (
     CENTRE_POSITIONS,
     FIRST_SIDES,
@@ -161,7 +161,7 @@ class HandCourse(Course):
 def hand_table(positions: Sequence[HandPosition], noise: NoiseAtRest, outputs: Sequence[str] = OUTPUTS) -> Table:
     """The table of positions. The noise of a mean is that of the blocks of a window, which a filter does not hide."""
     means, count = np.array([p.mean for p in positions]), np.array([float(p.n) for p in positions])
-    blocks = np.maximum(1.0, count / max(1, round(noise.rate_hz * 0.05)))
+    blocks = np.maximum(1.0, count / max(1, round(noise.rate_hz * BLOCK_S)))
     columns = {name: means[:, k] for k, name in enumerate(outputs)}
     columns |= {f"{name}_std": np.full(len(means), np.sqrt(noise.sway[k])) for k, name in enumerate(outputs)}
     return Table.from_columns("positions", {**columns, "n": blocks}, {}, "positions by hand")

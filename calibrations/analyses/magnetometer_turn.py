@@ -10,8 +10,9 @@ The results are compared with those of an ellipsoid fit.
 A turn in the horizontal plane does not show two effects of soft iron: a part of the vertical field Z in the horizontal
 axes, which is constant and so looks like hard iron, and the mean gain of the horizontal field. Soft iron without a
 preferred direction has five components of equal size. The plane shows two of them, as e = (r - q) / (r + q); each other
-is e / sqrt(2) times a t of two degrees of freedom. The uncertainties are half of its 95 % interval, `UNSEEN` e, of Z
-and of the horizontal field. The first effect cancels in the mean of a turn and a turn with the sensor turned over.
+is e / sqrt(2) times a t of two degrees of freedom. The standard uncertainties are half of the half-width of its 95 %
+interval, `HIDDEN_IRON` e, of Z and of the horizontal field. The first effect cancels in the mean of a turn and a turn
+with the sensor turned over.
 
 Source  Book 17.5; JCGM 100, 4.3.7 (rectangular), G.3 (t); Konvalin, Compensating for tilt, hard-iron and soft-iron
         effects (2009).
@@ -27,13 +28,16 @@ import numpy as np
 from calibrations.criteria import FEWEST_TURNS
 from calibrations.table import Array
 
-HIDDEN_IRON = 4.302653 / 2 / np.sqrt(2)  # t of two degrees of freedom, 97.5 %
+HIDDEN_IRON = 4.302653 / 2 / np.sqrt(2)  # 4.30: quantile 97.5 % of t with two degrees of freedom; 2: coverage factor
 
 
 @dataclass(frozen=True)
 class Ellipse:
-    """The ellipse that iron makes of a horizontal turn: greatest and least radius, and the major axis's angle; of how
-    many points."""
+    """The ellipse that iron makes of a horizontal turn: its radii, the angle of its major axis, and its points.
+
+    `greatest` and `least` are radii in the unit of the outputs; `angle_rad` is from x to the major axis; `n` is the
+    number of points.
+    """
 
     greatest: float
     least: float
@@ -52,7 +56,10 @@ class Ellipse:
         return float(self.least / self.greatest * missed / np.sqrt(6))
 
     def angle_std_deg(self, noise: float) -> float:
-        """Uncertainty of the major axis's angle, from the steps and from the `noise` of one radius; 52: any angle."""
+        """Standard uncertainty of the major axis's angle, deg, from the steps between points and from noise.
+
+        `noise`: standard deviation of one radius. At most 180 / sqrt(12), where the angle is unknown.
+        """
         difference = max(self.greatest - self.least, 1e-12 * self.greatest)
         return float(min(np.hypot(360 / self.n / np.sqrt(12), np.degrees(noise / (2 * difference))), 180 / np.sqrt(12)))
 
@@ -116,7 +123,7 @@ class ExtremesEstimate:
     hard_iron: Array
     hard_iron_std: Array
     soft_iron: Ellipse
-    left_per_mille: float  # that the magnitude of all turns varies by afterwards
+    left_per_mille: float  # variation of the magnitude after the correction
 
 
 def field_elements(sensed: Array, sensor_from_base: Array, turns: Sequence[str]) -> Elements:
