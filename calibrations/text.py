@@ -234,7 +234,7 @@ def unit(text: str) -> str:
 
 
 def add_prefix(unit_name: str, reach: float) -> tuple[float, str]:
-    """(factor, unit with prefix) for values up to `reach` in the unit `of`, as `unit` writes it."""
+    """(factor, unit with prefix) for values up to `reach` in the unit `unit_name`, as `unit` writes it."""
     if not unit_name.startswith(PREFIX_UNITS):
         return 1.0, unit_name
     factor, letter = prefix(reach)

@@ -153,8 +153,8 @@ def _with_change(model: Model, i: int, j: int, change: float) -> Model:
 
 # The memory of a product at each row of a table, after the samples of the whole path to that row.
 #
-# Between poses the path is that of the stages, as in the effects themselves (`calibrations.visits`). The sensed values
-# on it stand for the values of the product there; the two are as close as at the poses.
+# Between poses the path is that of the stages, as in the effects themselves (`calibrations.geometry.stage_path`). The
+# sensed values on it stand for the values of the product there; the two are as close as at the poses.
 
 
 def memory_at(table: Table, a: Array, forward: Forward) -> dict[str, Array]:

@@ -99,7 +99,9 @@ class Compensation:
 def invert_model(
     model: Model, input_range: Range | None = None, without: Collection[str] = (), precision: str = "double"
 ) -> Compensation:
-    """The compensation of a fitted model for the range `within`, without the effects in `without`.
+    """The compensation of a fitted model over `input_range`, without the effects in `without`.
+
+    `input_range` is by default that of the data of the fit; `precision` is "double" or "float".
 
     Raises ModelError for a model without values, and for one without a provable inverse over the range, with the effect
     that prevents it.

@@ -203,7 +203,7 @@ PLAN_COLUMNS = ("t_s", "direction")  # a plan's own: the mean of other data does
 
 
 def predict_data(template: Fit, columns: Mapping[str, Array]) -> Table:
-    """The expected table of a sensor such as that of `like` for planned `columns`.
+    """The expected table of the sensor of the fit `template` for planned `columns`.
 
     `columns`, each of shape (n,): alpha_deg and beta_deg; optionally direction, flip, mount_deg, t_s,
     temperature_c, ...; `n` samples a mean, or `dwell_s` at the data's sample rate, else as many as the data's. Columns

@@ -1,7 +1,7 @@
 """The experiment that separates two effects that the present data cannot separate.
 
-`separating` goes by the physics of the two alone. Where a bench is known, each experiment of MENU is planned on it, and
-`calibrations/design/expected.py` computes how far apart the two will lie.
+`separating_experiment` chooses by the physics of the two alone. Where a bench is known, each experiment of MENU is
+planned on it, and `calibrations/design/expected.py` computes how far apart the two will lie.
 """
 
 from __future__ import annotations

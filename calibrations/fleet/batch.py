@@ -116,14 +116,17 @@ def _common(scores: list[Score], rank: int) -> tuple[float, float]:
 
 
 def _limit_scores(scores: list[Score]) -> tuple[Array, Array]:
-    """Scores (n, k), none longer than MOST_OF_ONE times the median, and the factors (n,) that make them so."""
+    """Scores (n, k), none longer than MOST_SCORE_LENGTH times the median, and the factors (n,) that make them so."""
     length = np.sqrt([s.statistic for s in scores])
     weights = np.minimum(1.0, MOST_SCORE_LENGTH * np.median(length) / np.maximum(length, 1e-300))
     return np.array([s.score for s in scores]) * weights[:, None], weights
 
 
 def _sensor_chance(statistics: Array, ranks: Array) -> float:
-    """Chance that noise makes as many sensors gain from the effect; 1 where they are fewer than MOST."""
+    """Chance that noise makes as many sensors gain from the effect.
+
+    1 where a smaller share of them than LEAST_GAINING_SHARE gains.
+    """
     n, gaining = len(statistics), int(np.sum(statistics > LEAST_SHARED_GAIN * ranks))
     if gaining < LEAST_GAINING_SHARE * n:
         return 1.0

@@ -4,7 +4,7 @@
 
 per channel. W: the white variances of the means. k: scatter from row to row beyond the white noise. G: a Gauss-Markov
 process, or flicker noise as a sum of them with time constants evenly spaced on a logarithmic scale; w the rms of white
-noise and scatter. Where the white noise is not known, W is zero and k takes its place. `means_fit` estimates these.
+noise and scatter. Where the white noise is not known, W is zero and k takes its place. `noise_fit` estimates these.
 s_j, G_j: Gauss-Markov processes that are known from elsewhere, as from a still record of the same sensor
 (`table_noise`); then no G is estimated.
 

@@ -1,4 +1,4 @@
-"""A chart as a neutral value: panels with axes and series. `matplotlib_chart` and `plotly_chart` render it.
+"""A chart as a neutral value: panels with axes and series. The modules `static` and `interactive` render it.
 
 Coordinates are in the units of the axis labels. Series are drawn in their order. Colours are names of roles below;
 text and grid take the colour of the page.
