@@ -162,7 +162,7 @@ def choose_best(experiments: Sequence[Experiment], criteria: Sequence[str]) -> E
 
 
 def _will_separate(e: Experiment, probability: str) -> bool:
-    """Whether it separates the explanations; `probability` is the name of the attribute of `Expected`."""
+    """Whether it separates the explanations; `probability` is the name of an attribute of `ExpectedResult`."""
     return bool(getattr(e.expected, probability) >= CERTAIN_PROBABILITY)
 
 

@@ -160,16 +160,16 @@ class MeasuredRun:
 
     @property
     def constants(self) -> Mapping[str, str | float]:
-        """The constants of the bench and of the sensor."""
-        motion = tables.constants(self.run, self.sensor) if KINDS[self.run.kind].moving else {}
+        """The constants of the bench and the sensor, of the displacement sensor in a motion, and remarks on the run."""
+        of_run = tables.constants(self.run, self.sensor) if KINDS[self.run.kind].moving else {}
         if changes := [event.text for event in self.record.events(self.run.run) if event.what == CHANGED]:
-            motion[PROGRAM_CHANGED] = "; ".join(changes)  # also in every export
+            of_run[PROGRAM_CHANGED] = "; ".join(changes)  # also in every export
         if stops := interruptions(self.record, self.run.run):
-            motion[INTERRUPTIONS] = stops
+            of_run[INTERRUPTIONS] = stops
         if self.sensor is None:
-            return {**self.run.constants, **motion}
+            return {**self.run.constants, **of_run}
         sensor = Sensor.model_validate(self.run.bench["sensors"][self.sensor])
-        return {**self.run.constants, **sensor.constants, **motion}
+        return {**self.run.constants, **sensor.constants, **of_run}
 
     def table(self) -> Table:
         """A row for each pose or, in a run of another kind, for each sample. Raises RecordError without a row."""

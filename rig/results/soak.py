@@ -78,10 +78,11 @@ def steady(dwells: Sequence[Dwell], oven_c: float) -> bool:
     if len(list(groupby(reversals, lambda dwell: dwell.pose.path))) < FEWEST_APPROACH_VALUES:
         return False
     sensors = dict.fromkeys(name.rpartition(".")[0] for name in dwells[0].means if name[-2:] in ENDS)
-    return all(_is_at_rest(soak_of(table_of(reversals, sensor), oven_c)) for sensor in sensors)
+    return all(_is_steady(soak_of(table_of(reversals, sensor), oven_c)) for sensor in sensors)
 
 
-def _is_at_rest(soak: Soak) -> bool:
+def _is_steady(soak: Soak) -> bool:
+    """Whether bias and scale factor are certainly steady, with FEWEST_STEADY reversals after that time."""
     for course in soak.courses.values():
         state, last_s = course.state, course.t_s[-1]
         time = course.time_s

@@ -97,13 +97,13 @@ def magnetometer_turn(measured: MeasuredRun) -> dict[str, Result | Missing]:
     names, std = [p.path for p in poses], _std(table)
     extremes = iron_by_extremes(table.outputs, [p.up for p in poses], names, std)
     reason = magnetometer_coverage_warning(table)
-    ellipsoid = _missing_results(reason) if reason else _ellipsoid_results(table, poses)
+    by_ellipsoid = _missing_results(reason) if reason else _ellipsoid_results(table, poses)
     level = [k for k, pose in enumerate(poses) if pose.path == poses[0].path]  # the turn about z, upward, is first
     attitudes = np.array([sensor_from_base(poses[k]) for k in level])
-    azimuth = ellipsoid[ELEMENTS["D"]]
+    azimuth = by_ellipsoid[ELEMENTS["D"]]
     std_deg = azimuth.std if isinstance(azimuth, Result) else None
     turn_std_deg = None if std_deg is None else std_deg * len(set(names)) ** 0.5
-    return ellipsoid | _extremes_results(
+    return by_ellipsoid | _extremes_results(
         extremes, level_elements_by_extremes(table.outputs[level], attitudes, turn_std_deg), std, table.unit
     )
 

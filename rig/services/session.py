@@ -243,7 +243,7 @@ def model_session(request: Request) -> ModelSession[Any]:
     """A new session of data (a file or a run) and a model. Raises what `load_request` and `fit` raise."""
     notes: list[str] = []
     content = Content("")
-    with suppress(RecordError, OSError):  # `loaded` gives the better message
+    with suppress(RecordError, OSError):  # `load_request` gives the better message
         content = content_of(request.data, request.model)  # before the data: a later row makes the session old
     report(f"Reading {request.data}")
     question = load_request(request, notes.append)
