@@ -74,9 +74,7 @@ def recover(source: Path, folder: Path) -> Recovered:
 
 def _recover_rows(source: Path, target: Path) -> Recovered:
     """Copy the readable rows of the file `source` into the new file `target`."""
-    with closing(_open_damaged(source)) as old:
-        open_file(target).dispose()
-        new = sqlite3.connect(target)
+    with closing(_open_damaged(source)) as old, closing(_open_new(target)) as new:
         rows, damaged = {}, []
         for table in metadata.sorted_tables:
             copied, is_complete = _copy_rows(old, new, table.name)
@@ -91,8 +89,13 @@ def _recover_rows(source: Path, target: Path) -> Recovered:
             new.execute(f"DELETE FROM {name} WHERE NOT EXISTS (SELECT 1 FROM {other_table} WHERE {match})")  # noqa: S608
         new.commit()
         new.execute("PRAGMA journal_mode = DELETE")  # all is in one file, which gets its name now
-        new.close()
     return Recovered(rows, tuple(damaged), damaged_samples, replaced_runs)
+
+
+def _open_new(target: Path) -> sqlite3.Connection:
+    """A new record with empty tables."""
+    open_file(target).dispose()
+    return sqlite3.connect(target)
 
 
 _MAGIC = b"SQLite format 3\0"
