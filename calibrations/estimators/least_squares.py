@@ -22,11 +22,13 @@ SMALLEST_DIAGONAL = 1e-12  # of a diagonal element over the greatest, below whic
 
 
 @dataclass(frozen=True)
-class Estimate:
-    """Unknowns (n,), their covariance (n, n), the weighted sum of the squared residuals, and how many measurements
-    there are beyond the unknowns.
+class LinearEstimate:
+    """Estimated unknowns of a linear equation.
 
-    The covariance is that of the variances that were given; where none were, of a variance of 1.
+    values      shape (n,)
+    covariance  shape (n, n), by the given variances of the measurements; by a variance of 1 if none were given
+    square      weighted sum of the squared residuals
+    freedom     number of measurements beyond the unknowns
     """
 
     values: Array
@@ -41,7 +43,7 @@ class Estimate:
         return np.asarray(np.sqrt(variance * np.diag(self.covariance)))
 
 
-def least_squares(matrix: Array, measured: Array, variances: Array | float = 1.0) -> Estimate:
+def least_squares(matrix: Array, measured: Array, variances: Array | float = 1.0) -> LinearEstimate:
     """x of `measured` = `matrix` x + noise; shapes (m, n), (m,), (m,).
 
     Raises TooFewRows where the measurements do not determine every unknown.
@@ -54,17 +56,17 @@ def least_squares(matrix: Array, measured: Array, variances: Array | float = 1.0
         raise TooFewRows(f"the measurements do not determine {n} unknowns; measure more, or at other conditions")
     inverse = solve_triangular(triangle[:n, :n], np.eye(n))
     residual = triangle[n:, n]
-    return Estimate(inverse @ triangle[:n, n], inverse @ inverse.T, float(residual @ residual), m - n)
+    return LinearEstimate(inverse @ triangle[:n, n], inverse @ inverse.T, float(residual @ residual), m - n)
 
 
-def shortest_solution(matrix: Array, measured: Array, variances: Array) -> Estimate:
+def shortest_solution(matrix: Array, measured: Array, variances: Array) -> LinearEstimate:
     """`least_squares` for columns that may depend on each other: the solution of least length."""
     weight = 1 / np.sqrt(variances)
     weighted, values = matrix * weight[:, None], measured * weight
     covariance = np.asarray(np.linalg.pinv(weighted.T @ weighted, rcond=1e-10, hermitian=True))
     solution = covariance @ (weighted.T @ values)
     square = float(np.sum((values - weighted @ solution) ** 2))
-    return Estimate(solution, covariance, square, len(measured) - int(np.linalg.matrix_rank(weighted)))
+    return LinearEstimate(solution, covariance, square, len(measured) - int(np.linalg.matrix_rank(weighted)))
 
 
 def between_variance(matrix: Array, measured: Array, variances: Array, freedom: int) -> float:
@@ -112,8 +114,8 @@ class Recursive:
         triangle = np.asarray(np.linalg.qr(np.vstack([self.triangle, new]), mode="r"))
         return replace(self, triangle=triangle, count=self.count + 1)
 
-    def estimate(self) -> Estimate:
-        """The unknowns so far; NaN where undetermined; its sum with others may be determined."""
+    def estimate(self) -> LinearEstimate:
+        """The unknowns so far; NaN for an undetermined one, even if a sum with it is determined."""
         n = len(self.triangle) - 1
         size = np.linalg.norm(self.triangle[:, :n], axis=0)
         size[size == 0] = 1.0
@@ -126,4 +128,4 @@ class Recursive:
         residual = self.triangle[:, n] - left_vectors[:, determined] @ (
             left_vectors[:, determined].T @ self.triangle[:, n]
         )
-        return Estimate(values, covariance, float(residual @ residual), self.count - int(determined.sum()))
+        return LinearEstimate(values, covariance, float(residual @ residual), self.count - int(determined.sum()))
