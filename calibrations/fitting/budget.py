@@ -26,7 +26,7 @@ from scipy.special import stdtrit
 
 from calibrations.criteria import COVERAGE
 from calibrations.fitting.fit import Fit
-from calibrations.fitting.identifiability import covariance, gain
+from calibrations.fitting.identifiability import correlation_matrix, covariance, gain
 from calibrations.fitting.inputs import Contribution
 from calibrations.means.noise import MOST_CORRELATED_ROWS, Noise
 from calibrations.table import Array
@@ -211,10 +211,3 @@ def parameter_correlation(fit: Fit, budget: Budget, inputs: Iterable[Contributio
             by_error = input_effects(fit, G, c)
             joint = joint + c.std**2 * by_error.T @ by_error
     return correlation_matrix(joint)
-
-
-def correlation_matrix(covariance: Array) -> Array:
-    """The correlation matrix of a covariance matrix (p, p); NaN where a variance is 0."""
-    std = np.sqrt(np.diag(covariance))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(covariance / np.outer(std, std))

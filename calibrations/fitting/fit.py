@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from calibrations.errors import ModelError, UnknownName, nearest
-from calibrations.fitting.identifiability import covariance, with_estimates
+from calibrations.fitting.identifiability import correlation_matrix, covariance, with_estimates
 from calibrations.fitting.minimise import minimise
 from calibrations.fitting.noise_fit import estimate
 from calibrations.fitting.problem import Problem
@@ -72,8 +72,7 @@ class Fit(Solution, Result):
         NaN for parameters that the data do not determine. Uncertain inputs, such as the stages' angles, correlate
         parameters further; the certificate and the report include them.
         """
-        std = np.sqrt(np.diag(self.covariance))
-        return np.asarray(self.covariance / np.outer(std, std))
+        return correlation_matrix(self.covariance)
 
     def to_dataframe(self, of: str = "parameters") -> Any:
         """The parameters, or their "covariance" or "correlation" with names, as a pandas.DataFrame.

@@ -28,6 +28,13 @@ def covariance(jacobian: Array, typical: Array) -> tuple[Array, Array]:
     return root @ root.T, np.linalg.qr(null.T)[0].T
 
 
+def correlation_matrix(covariance: Array) -> Array:
+    """The correlation matrix of a covariance matrix (p, p); NaN where a variance is 0 or unknown."""
+    std = np.sqrt(np.diag(covariance))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(covariance / np.outer(std, std))
+
+
 def gain(jacobian: Array, typical: Array) -> Array:
     """The pseudo-inverse (p, rows) of the whitened jacobian: the change of each parameter by a change of each row."""
     U, root, _ = _directions(jacobian, typical)

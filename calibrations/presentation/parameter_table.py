@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from calibrations.discovery.findings import FittedModel
-from calibrations.fitting.budget import correlation_matrix, make_budget, parameter_correlation
+from calibrations.fitting.budget import make_budget, parameter_correlation
 from calibrations.fitting.fit import Fit
-from calibrations.fitting.identifiability import covariance
+from calibrations.fitting.identifiability import correlation_matrix, covariance
 from calibrations.fitting.inputs import input_contributions
 from calibrations.model import Estimate, Model, Term
 from calibrations.noise.fit import NoiseFit, power_covariance
