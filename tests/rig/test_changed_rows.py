@@ -148,6 +148,18 @@ def test_a_changed_pose_is_named_until_it_is_excluded(tmp_path: Path, statement:
         assert record.poses(run) == [Pose(90, 0), Pose(90, 2)]
 
 
+def test_poses_keep_their_numbers_after_a_damaged_one(rig: Rig, rig_home: Path) -> None:
+    run = recorded(rig_home, 3)
+    change(rig_home, "UPDATE blocks SET rate_hz = 1001.0 WHERE number = 1")
+    with Record() as record:
+        record.exclude(run, [1], "damaged")
+    listed = rig("show", run, "--poses", "--json").document["kept"]
+    assert [(pose["pose"], pose["beta_deg"]) for pose in listed] == [(0, 0), (2, 2)]
+    assert rig("exclude", run, str(listed[-1]["pose"]), "--reason", "touched").status == 0
+    (first,) = [pose for pose in rig("show", run, "--poses", "--json").document["kept"] if pose["excluded"] is None]
+    assert first["beta_deg"] == 0
+
+
 def test_changed_means_readings_and_columns_are_noticed(golden, tmp_path: Path) -> None:
     run = recorded(tmp_path, 1)
     change(tmp_path, "UPDATE dwells SET n = 399")

@@ -93,12 +93,12 @@ def _poses(record: Record, run: Run) -> list[dict[str, Any]]:
 def _iterate_poses(record: Record, run: Run) -> Iterator[dict[str, Any]]:
     """Every measured pose as JSON."""
     units: Mapping[str, str] | None = None
-    for number, recorded in enumerate(record.kept(run.run)):
+    for recorded in record.kept(run.run):
         units = units_of(run, recorded.samples.channels) if units is None else units
-        yield _pose(number, recorded, units)
+        yield _pose(recorded, units)
 
 
-def _pose(number: int, recorded: KeptPose, units: Mapping[str, str]) -> dict[str, Any]:
+def _pose(recorded: KeptPose, units: Mapping[str, str]) -> dict[str, Any]:
     """One pose as JSON: means in V, and those of channels in other `units`."""
     names = ("alpha_deg", "beta_deg", "direction", "mount_deg", "flip", "up", "rate_deg_s")
     angles = {name: getattr(recorded.pose, name) for name in names}
@@ -108,7 +108,7 @@ def _pose(number: int, recorded: KeptPose, units: Mapping[str, str]) -> dict[str
     if units:
         values |= {"means": {name: means[name] for name in units if name in means}, "units": dict(units)}
     return {
-        "pose": number, "path": recorded.pose.path, **angles, **circumstances, **values,
+        "pose": recorded.number, "path": recorded.pose.path, **angles, **circumstances, **values,
         "sha256": digest_of(recorded.samples),
     }  # fmt: skip
 
