@@ -9,7 +9,8 @@ Over a cycle of temperature the slope and the difference between up and down fol
     y = y0 + k (T - T0) + h s [+ d t]     s = 1/2 on the way up, the top included, -1/2 on the way down
 
 d is drift, separable from hysteresis only with more than one cycle. The residual of a straight line (curvature, slow
-noise) widens the standard errors, with few steps by Student's t.
+noise) widens the standard errors, with few steps by Student's t. If the noise of the tumbles is not known (all samples
+of each mean are equal), the standard errors follow from the residual alone.
 
 Source  IEEE 1293, four-point tumble, temperature sensitivity; JCGM 101, 6.4.9: the standard uncertainty of a
         t-distribution.
@@ -103,7 +104,10 @@ DIRECTIONS = {"up": 0.5, "down": -0.5}  # s of the formula, by the first word of
 
 @dataclass(frozen=True)
 class TemperatureCoefficients:
-    """Slope per K, and up minus down, each (value, standard error): of a bias in V, of a scale factor as a fraction."""
+    """Slope per K, and up minus down, each (value, standard error): of a bias in V, of a scale factor as a fraction.
+
+    A standard error is NaN if the noise is not known and no tumble is left to estimate it.
+    """
 
     slope: tuple[float, float]
     hysteresis: tuple[float, float]
@@ -129,7 +133,10 @@ def _fit_coefficients(steps: Sequence[Tumble], y: Array, std: Array) -> Temperat
     free = len(steps) - columns.shape[1]
     if not np.isfinite(columns).all() or np.linalg.matrix_rank(columns) < columns.shape[1]:
         raise DataError("the cycle lacks different temperatures on the way up and down; use a bench with an oven")
-    solution = least_squares(columns, y, np.where(std > 0, std, 1.0) ** 2)
+    known = bool(np.any(std > 0))
+    solution = least_squares(columns, y, np.where(std > 0, std, std.max()) ** 2 if known else 1.0)
     factors = solution.values
-    widened = np.sqrt(np.diag(solution.covariance) * max(1.0, solution.square / max(free - 2, 1)))
+    excess = solution.square / max(free - 2, 1)
+    variance = max(1.0, excess) if known else excess if free > 0 else np.nan
+    widened = np.sqrt(np.diag(solution.covariance) * variance)
     return TemperatureCoefficients((float(factors[0]), float(widened[0])), (float(factors[1]), float(widened[1])))

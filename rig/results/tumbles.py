@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from calibrations.analyses.stability import fit_trend, repeatability
@@ -71,10 +73,15 @@ def temperature_cycle(measured: MeasuredRun) -> dict[str, Result]:
             ("scale", "", scale_coefficients(steps)),
         ):
             slope, slope_std = coefficients.slope
-            results[f"{name}-temperature-{axis}"] = Result(slope, f"{unit or '1'}/K", slope_std)
+            results[f"{name}-temperature-{axis}"] = Result(slope, f"{unit or '1'}/K", _known(slope_std))
             hysteresis, std = coefficients.hysteresis
-            results[f"{name}-temperature-hysteresis-{axis}"] = Result(hysteresis, unit, std)
+            results[f"{name}-temperature-hysteresis-{axis}"] = Result(hysteresis, unit, _known(std))
     return results
+
+
+def _known(std: float) -> float | None:
+    """The standard uncertainty of a result; None if it is not known."""
+    return None if math.isnan(std) else std
 
 
 @evaluates("sweep")

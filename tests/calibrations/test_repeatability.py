@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -103,6 +105,36 @@ def test_two_cycles_tell_drift_from_hysteresis() -> None:
 
 def test_what_a_straight_line_leaves_widens_the_standard_errors() -> None:
     assert bias_coefficients(steps(1, curve=1e-6)).slope[1] > 10 * bias_coefficients(steps(1)).slope[1]
+
+
+def of_noise(std: float, count: int = 10) -> list[Tumble]:
+    """The steps of two cycles, with 1 uV of scatter and the standard errors `std`."""
+    random = np.random.default_rng(4)
+    return [
+        replace(step, bias_v=step.bias_v + 1e-6 * random.standard_normal(), bias_std_v=std, scale_std=std)
+        for step in steps(2)[:count]
+    ]
+
+
+def test_without_known_noise_the_residual_gives_the_standard_errors() -> None:
+    slope, hysteresis = bias_coefficients(of_noise(0.0)).slope, bias_coefficients(of_noise(0.0)).hysteresis
+    known = bias_coefficients(of_noise(1e-6))
+    assert (slope[0], hysteresis[0]) == pytest.approx((1e-3, 4e-4), abs=5e-6)
+    assert (slope[1], hysteresis[1]) == pytest.approx((known.slope[1], known.hysteresis[1]), rel=1.0)
+    assert slope[1] < 1e-7
+    assert scale_coefficients(of_noise(0.0)).slope[1] < 1e-6
+
+
+def test_a_tumble_of_unknown_noise_counts_like_the_others() -> None:
+    one, *others = of_noise(1e-6)
+    mixed = bias_coefficients([replace(one, bias_std_v=0.0), *others])
+    assert mixed == bias_coefficients(of_noise(1e-6))
+
+
+def test_no_scatter_and_no_known_noise_give_no_standard_error() -> None:
+    three = [step for step in of_noise(0.0, 5) if step.temperature_c != 50]
+    assert bias_coefficients(three).slope[0] == pytest.approx(1e-3, rel=0.01)
+    assert np.isnan(bias_coefficients(three).slope[1])
 
 
 def test_one_temperature_has_no_slope(golden) -> None:
