@@ -56,7 +56,7 @@ class Oven:
         self._unit, self._clock = unit, clock
         self._told_c: float | None = None  # the last set point sent
         self._running = False  # whether it was switched on
-        self._shown_c, self._since_s = math.nan, 0.0  # the last temperature, and since when
+        self._shown_c, self._since_s = math.nan, 0.0  # the last temperature; since when it should have changed
 
     def identify(self) -> Identity:
         """A general name, after an exchange: the controller has no register with its name."""
@@ -94,11 +94,14 @@ class Oven:
         """Give a new set point; raises LimitError before anything is sent."""
         require_within(f"{self.name}: ", temperature_c, self.settings.limits_c, "C", OUTSIDE_TEMPERATURE)
         self._unit.write(SET_POINT, temperature_c)
-        self._told_c = temperature_c
+        if temperature_c != self._told_c:  # repeating a set point gives a stuck thermometer no more time
+            self._told_c, self._since_s = temperature_c, self._clock.now()
 
     def run(self, on: bool) -> None:
         """Let the controller heat, or stop it."""
         self._unit.write_bit(RUN_BIT, on, "run")
+        if on and not self._running:
+            self._since_s = self._clock.now()
         self._running = on
 
     def running(self) -> bool:

@@ -62,6 +62,39 @@ def test_one_that_need_not_heat_may_stand_still(oven: Callable[..., Any], clock:
         still.temperature_c()
 
 
+def test_a_new_set_point_after_an_idle_time_is_no_fault(oven: Callable[..., Any], clock: SimulatedClock) -> None:
+    idle = oven()
+    idle.set_temperature(idle.temperature_c())
+    idle.run(True)
+    shown_c = idle.temperature_c()
+    clock.sleep(400.0)
+    idle.set_temperature(60.0)
+    assert idle.temperature_c() == pytest.approx(shown_c, abs=0.1)
+
+
+def test_an_oven_that_is_switched_on_after_an_idle_time_is_no_fault(
+    oven: Callable[..., Any], clock: SimulatedClock
+) -> None:
+    idle = oven()
+    idle.set_temperature(60.0)
+    shown_c = idle.temperature_c()
+    clock.sleep(400.0)
+    idle.run(True)
+    assert idle.temperature_c() == pytest.approx(shown_c, abs=0.1)
+
+
+def test_a_repeated_set_point_hides_no_stuck_thermometer(oven: Callable[..., Any], clock: SimulatedClock) -> None:
+    stuck = oven(Fault("stale", at_s=100.0))
+
+    def repeat() -> None:
+        for _ in range(30):
+            heating(stuck, clock, 60.0, 20.0, clock.now() + 20.0)
+
+    with pytest.raises(SensorFault, match="while approaching 60 C"):
+        repeat()
+    assert clock.now() < 500.0
+
+
 def test_a_thermometer_that_has_stuck_is_found_while_the_heater_follows_it(
     oven: Callable[..., Any], world: World, clock: SimulatedClock
 ) -> None:
