@@ -351,7 +351,7 @@ def _course(quantity: str, axis: str, tumbles: list[Tumble]) -> Course:
         values, stds = np.array([(tumble.bias_v, tumble.bias_std_v) for tumble in tumbles]).T
     else:
         values = np.array([tumble.scale_v_per_g for tumble in tumbles])
-        stds = values * np.array([tumble.scale_std for tumble in tumbles])
+        stds = np.abs(values) * np.array([tumble.scale_std for tumble in tumbles])
     state = fit_steady_state(t_s, values, stds) if len(t_s) >= FEWEST_APPROACH_VALUES else None
     return Course(quantity, axis, t_s, values, stds, state)
 

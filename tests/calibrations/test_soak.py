@@ -41,6 +41,15 @@ def test_bias_and_scale_factor_come_to_rest() -> None:
     assert found.gaps == ()
 
 
+def test_a_negative_scale_factor_has_the_uncertainty_of_a_positive_one(undrawn: None) -> None:
+    table = soak_table(10800.0)
+    columns = {**table.columns, "vx_v": 5.0 - table.column("vx_v")}
+    mirrored = analyse_soak(type(table).from_columns("poses", columns, table.constants, "", table.labels))
+    course, positive = mirrored.courses["scale-x"], analyse_soak(table).courses["scale-x"]
+    assert course.values == pytest.approx(-positive.values)
+    assert course.stds == pytest.approx(positive.stds)
+
+
 def test_times_count_from_power_on() -> None:
     table = soak_table()
     columns = {**table.columns, "t_s": table.time_s + 3600.0}
