@@ -53,8 +53,7 @@ def slow_processes(model: Model, axis: str, table: Table) -> Processes:
     """The processes of one axis at the times of a table."""
     if not any(e.axis == axis for e in model.params.values()):
         raise ModelError(f"{model.name}: the noise model has no values for the axis {axis}, which {table.source} has")
-    gaps_s = np.diff(np.sort(table.time_s))
-    gap_s, span_s = float(np.median(gaps_s)), float(np.sum(gaps_s))
+    gap_s, span_s = _typical_gap_s(table), float(np.ptp(table.time_s))
     walk = model.value(f"rate-random-walk.coefficient.{axis}")
     slowest_s = BEYOND * span_s
     processes = [*_flicker(model.value(f"flicker-noise.coefficient.{axis}"), gap_s / 2, slowest_s)]
@@ -62,6 +61,19 @@ def slow_processes(model: Model, axis: str, table: Table) -> Processes:
     sigma, time_s = (model.value(f"gauss-markov-noise.{name}.{axis}") for name in ("sigma", "time_constant"))
     processes += [(sigma, time_s)]
     return tuple((float(std), float(tau_s)) for std, tau_s in processes if std > 0)
+
+
+def _typical_gap_s(table: Table) -> float:
+    """The median time from one row to the next, s. Raises DataError if it is 0, and for a single row."""
+    if table.n < 2:
+        raise DataError(f"{table.source}: slow noise needs two rows or more, and this table has one; measure more rows")
+    if not (gap_s := float(np.median(np.diff(np.sort(table.time_s))))) > 0:
+        raise DataError(
+            f"{table.source}: column t_s: more than half of the rows have the same time as another row, so that slow "
+            "noise cannot be separated from the scatter of the rows; give each row its own time, in s, with enough "
+            "decimals"
+        )
+    return gap_s
 
 
 def _flicker(coefficient: float, fastest_s: float, slowest_s: float) -> Processes:

@@ -94,6 +94,16 @@ def test_known_processes_whiten_what_they_make() -> None:
     assert 2 < noise.wander[0] < np.hypot(2, 3)
 
 
+@pytest.mark.parametrize("times_s", [np.repeat(np.arange(4.0), 10), np.repeat(7.0, 40), np.zeros(1)])
+def test_slow_noise_needs_a_time_of_each_row(golden, times_s: np.ndarray) -> None:
+    columns = {"alpha_deg": np.full(len(times_s), 90.0), "beta_deg": np.zeros(len(times_s)), "t_s": times_s}
+    table = Table.from_columns(
+        "poses", columns | {"vx_v": columns["beta_deg"], "vy_v": columns["beta_deg"]}, {}, "rows"
+    )
+    with golden.refused(DataError):
+        with_noise(table, KNOWN)
+
+
 @pytest.mark.parametrize(
     ("model", "kind", "says"),
     [
