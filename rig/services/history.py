@@ -302,7 +302,8 @@ def _quantity(name: str, calibrations: Sequence[Calibration], limit: Limit | Non
     values = [calibration.values[name] for calibration in determined]
     numbers, stds = [calibration.value for calibration in values], [calibration.std for calibration in values]
     days = [calibration.at.timestamp() / 86400 for calibration in determined]
-    chart = control_chart(numbers, baseline, float(rms(np.array(stds)))) if len(determined) >= FEWEST_RUNS else None
+    least_sigma = float(rms(np.array(stds[:baseline])))
+    chart = control_chart(numbers, baseline, least_sigma) if len(determined) >= FEWEST_RUNS else None
     no_drift = _no_drift_text(determined, float(np.ptp(days)))
     line = None if no_drift else fit_stability(days, numbers, stds)
     limits = None

@@ -20,6 +20,7 @@ from rig.services.history import (
     History,
     Value,
     _most_frequent_kind,
+    _quantity,
     history,
     judge_history,
     latest,
@@ -116,6 +117,24 @@ def test_rigs_are_compared_by_all_calibrations_on_them() -> None:
     assert found.expanded == pytest.approx(2 * 2**0.5 * 1e-4)  # each rig's own error may be the same every time
     with pytest.raises(RecordError, match="no calibration on the rig 'C'"):
         compare_rigs(of, "A", "C")
+
+
+def test_a_later_poor_calibration_does_not_widen_the_limits_of_the_chart() -> None:
+    start, stds = datetime(2025, 1, 1, tzinfo=UTC), [1e-4, 1e-4, 1e-4, 1e-4, 0.1]
+    numbers = [2.5, 2.5, 2.5, 2.503, 2.5]
+    quantities = [
+        _quantity("bias-x", [_calibration(start, k, numbers[k], stds[k]) for k in range(count)], None, 3)
+        for count in (4, 5)
+    ]
+    before, after = (quantity.chart for quantity in quantities)
+    assert before is not None
+    assert after is not None
+    assert before.sigma == after.sigma == pytest.approx(1e-4)
+    assert after.signals == [3, 4]  # a jump, and then the weighted mean is still outside its limit
+
+
+def _calibration(start: datetime, day: int, value: float, std: float) -> Calibration:
+    return Calibration(f"r{day}", start + timedelta(days=day), "A", {"bias-x": Value(value, std, "V")}, None)
 
 
 @pytest.mark.sockets
