@@ -91,6 +91,8 @@ def control_chart(values: Sequence[float], baseline: int = BASELINE_RUNS, least_
             f"a control chart needs at least {FEWEST_RUNS} runs; there are {len(first)}; run check-standard again"
         )
     centre, mean_range = float(first.mean()), float(np.abs(np.diff(first)).mean())
+    if mean_range == 0:
+        centre = float(first[0])  # without the rounding of the mean, which would be outside limits without a width
     sigma = max(mean_range / D2, least_sigma)
     faded = (1 - EWMA_WEIGHT) ** (2 * np.arange(1, len(x) + 1))
     return Chart(

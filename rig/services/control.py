@@ -20,6 +20,10 @@ from rig.record import Run
 
 PROCEDURE = "check-standard"
 OUT = "out of control"
+ZERO_SCATTER = (
+    "the scatter of the baseline is zero, and the uncertainty of its values is unknown: any other value is outside the "
+    "limits; record more digits or more samples"
+)
 HEAD = ("sensor", "quantity", "runs", "centre", "sigma", "last", "verdict")
 
 
@@ -79,14 +83,22 @@ def row(quantity: ControlledQuantity) -> tuple[str, ...]:
 
 
 def signals(quantity: ControlledQuantity) -> list[str]:
-    """A line for every run outside a limit."""
+    """A line for every run outside a limit, and one for limits without a width."""
     chart, name = quantity.chart, f"{quantity.sensor} {quantity.quantity}"
-    jumps = [
-        f"{quantity.runs[k]}: {name} is {(chart.values[k] - chart.centre) / chart.sigma:+.1f} sigma from the centre"
-        for k in chart.jumps
-    ]
+    jumps = [f"{quantity.runs[k]}: {name} is {_distance(quantity, k)} from the centre" for k in chart.jumps]
     first = chart.drifts[:1]
-    return jumps + [f"{quantity.runs[k]}: {name} has drifted: its weighted mean is outside the limit" for k in first]
+    drifts = [f"{quantity.runs[k]}: {name} has drifted: its weighted mean is outside the limit" for k in first]
+    return [*([] if chart.sigma > 0 else [f"{name}: {ZERO_SCATTER}"]), *jumps, *drifts]
+
+
+def _distance(quantity: ControlledQuantity, k: int) -> str:
+    """The distance of a run from the centre, in sigma, or in the unit of the quantity where sigma is 0."""
+    chart = quantity.chart
+    distance = float(chart.values[k] - chart.centre)
+    if chart.sigma > 0:
+        return f"{distance / chart.sigma:+.1f} sigma"
+    factor, unit = add_prefix(quantity.unit, distance)
+    return f"{factor * distance:+.3g} {unit.replace('µ', 'u')}".rstrip()
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,11 @@ ONE = {"sensor": {"name": "ADXL203", "serial": "CS-1"}}
 
 
 def checks(
-    values: Sequence[float], bench: dict[str, Any] = ONE, name: str = "bias-x", state: str = "complete"
+    values: Sequence[float],
+    bench: dict[str, Any] = ONE,
+    name: str = "bias-x",
+    state: str = "complete",
+    std: float | None = 2e-6,
 ) -> list[str]:
     """Check-standard runs with these results, oldest first."""
     names = []
@@ -27,7 +31,7 @@ def checks(
         for value in values:
             about: dict[str, Any] = {"identities": {}, "configuration": "", "constants": {}, "source": "bench"}
             names.append(record.begin("check-standard", {}, bench=bench, **about))
-            record.set_state(names[-1], state, None, {name: {"value": value, "std": 2e-6, "unit": "V"}})
+            record.set_state(names[-1], state, None, {name: {"value": value, "std": std, "unit": "V"}})
     return names
 
 
@@ -116,6 +120,19 @@ def test_a_standard_that_was_measured_once_keeps_no_other_from_its_chart(rig: Ri
     checks(QUIET[:1], ONE | {"sensor": {"name": "ADXL203", "serial": "CS-9"}})
     ended = rig("control", "--json")
     assert {chart["sensor"] for chart in ended.document["charts"]} == {"CS-1"}
+
+
+def test_a_baseline_of_equal_values_without_uncertainty_is_named(golden, rig: Rig) -> None:
+    runs = checks([2.50001] * 10 + [2.50001, 2.50003], std=None)
+    ended = rig("control", "--baseline", "10")
+    assert ended.status == 1
+    golden.same(ended.out.replace(runs[11], "RUN"))
+    assert rig("control", "--baseline", "10", "--json").document["charts"][0]["sigma"] == 0
+
+
+def test_equal_values_are_in_control(rig: Rig) -> None:
+    checks([2.50001] * 22, std=None)  # numpy's mean of 20 of them is another number
+    assert rig("control").out.splitlines()[-1] == "in control"
 
 
 def test_control_gives_the_reason_if_there_is_no_chart(golden, rig: Rig) -> None:
