@@ -76,7 +76,7 @@ Limit = float | tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Value:
+class ParameterValue:
     """One parameter of one calibration."""
 
     value: float
@@ -94,7 +94,7 @@ class Calibration:
     data: str
     at: datetime
     rig: str
-    values: Mapping[str, Value]
+    values: Mapping[str, ParameterValue]
     expired: str | None
     kind: str = ""
     excess: float = 1.0
@@ -126,7 +126,7 @@ class Quantity:
     no_drift: str = ""
 
     @property
-    def last(self) -> Value:
+    def last(self) -> ParameterValue:
         return self.calibrations[-1].values[self.name]
 
 
@@ -268,7 +268,7 @@ def _calibration(record: Record, data: str, run: Run, model: Model) -> Calibrati
     table = MeasuredRun.named(record, data).table()
     fitted = fit(model, table)
     values = {
-        result_name(term.effect, e.name, e.axis): Value(e.value, e.std, e.unit)
+        result_name(term.effect, e.name, e.axis): ParameterValue(e.value, e.std, e.unit)
         for term, e in fitted.model.all_estimates
         if e.identified and e.std
     }

@@ -13,7 +13,7 @@ from calibrations.errors import DataError
 from calibrations.means.noise import rms
 from drivers.errors import did_you_mean
 from rig.errors import RecordError
-from rig.services.history import Calibration, History, Value, closest
+from rig.services.history import Calibration, History, ParameterValue, closest
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def compare(a: Calibration, b: Calibration) -> dict[str, tuple[str, Agreement]]:
     return _compare_parameters(a.values, b.values, a.data, b.data)
 
 
-def _means_on(rig: str, calibrations: Sequence[Calibration]) -> dict[str, Value]:
+def _means_on(rig: str, calibrations: Sequence[Calibration]) -> dict[str, ParameterValue]:
     on_rig = [calibration for calibration in calibrations if calibration.rig == rig]
     if not on_rig:
         raise RecordError(
@@ -78,7 +78,7 @@ def _means_on(rig: str, calibrations: Sequence[Calibration]) -> dict[str, Value]
 
 
 def _compare_parameters(
-    a: Mapping[str, Value], b: Mapping[str, Value], first_name: str, second_name: str
+    a: Mapping[str, ParameterValue], b: Mapping[str, ParameterValue], first_name: str, second_name: str
 ) -> dict[str, tuple[str, Agreement]]:
     shared = [name for name in a if name in b and a[name].unit == b[name].unit]
     if not shared:
@@ -86,9 +86,9 @@ def _compare_parameters(
     return {n: (a[n].unit, compare_values((a[n].value, a[n].std), (b[n].value, b[n].std))) for n in shared}
 
 
-def _mean(values: Sequence[Value]) -> Value:
+def _mean(values: Sequence[ParameterValue]) -> ParameterValue:
     """The mean. Its uncertainty has the calibrations' own, which may be common to all, and their scatter."""
     x = np.array([value.value for value in values])
     std = float(rms(np.array([value.std for value in values])))
     scatter = float(x.std(ddof=1) / np.sqrt(len(x))) if len(x) > 1 else 0.0
-    return Value(float(x.mean()), max(std, scatter), values[0].unit)
+    return ParameterValue(float(x.mean()), max(std, scatter), values[0].unit)

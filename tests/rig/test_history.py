@@ -18,7 +18,7 @@ from rig.record import Record
 from rig.services.history import (
     Calibration,
     History,
-    Value,
+    ParameterValue,
     _most_frequent_kind,
     _quantity,
     history,
@@ -108,7 +108,11 @@ def test_rigs_are_compared_by_all_calibrations_on_them() -> None:
     start = datetime(2025, 1, 1, tzinfo=UTC)
     of = [
         Calibration(
-            f"r{k}", start + timedelta(days=k), "AB"[k % 2], {"bias-x": Value(2.5 + 0.001 * (k % 2), 1e-4, "V")}, None
+            f"r{k}",
+            start + timedelta(days=k),
+            "AB"[k % 2],
+            {"bias-x": ParameterValue(2.5 + 0.001 * (k % 2), 1e-4, "V")},
+            None,
         )
         for k in range(6)
     ]
@@ -134,7 +138,7 @@ def test_a_later_poor_calibration_does_not_widen_the_limits_of_the_chart() -> No
 
 
 def _calibration(start: datetime, day: int, value: float, std: float) -> Calibration:
-    return Calibration(f"r{day}", start + timedelta(days=day), "A", {"bias-x": Value(value, std, "V")}, None)
+    return Calibration(f"r{day}", start + timedelta(days=day), "A", {"bias-x": ParameterValue(value, std, "V")}, None)
 
 
 @pytest.mark.sockets
@@ -214,7 +218,7 @@ def test_runs_of_one_day_have_no_drift_a_year(rig: Rig) -> None:
 
 def test_calibrations_of_another_kind_or_by_an_incomplete_model_are_not_compared() -> None:
     start = datetime(2020, 3, 1, tzinfo=UTC)
-    values = {"bias-x": Value(2.5, 1e-4, "V")}
+    values = {"bias-x": ParameterValue(2.5, 1e-4, "V")}
     kinds = ("sweep", "misalignment", "sweep", "sweep")
     of = [
         Calibration(f"r{k}", start + timedelta(days=100 * k), "A", values, None, kind, 1.0)
