@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from calibrations.analyses.hand_positions import FEWEST, Course, hand_table, largest_error
+from calibrations.analyses.hand_positions import FEWEST, HandProgress, hand_table, largest_error
 from calibrations.criteria import LEAST_FIELD_CHANGE, MOST_FIELD_EXCESS
 from calibrations.design.attitudes import Attitude, NextAttitude, assumed_field, estimate_field, next_attitude
 from calibrations.design.orientations import CENTRE_POSITIONS, directions_up
@@ -29,7 +29,7 @@ OUTPUTS = ("mx", "my", "mz")
 
 
 @dataclass(frozen=True)
-class FieldCourse(Course):
+class FieldCourse(HandProgress):
     """The positions of a magnetometer so far, each with the attitude that was wanted.
 
     Attitudes `skipped` are not wanted.

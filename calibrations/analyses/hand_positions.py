@@ -60,7 +60,7 @@ class NextPosition(Protocol):
 
 
 @dataclass(frozen=True)
-class Course(ABC):
+class HandProgress(ABC):
     """The positions so far, of any sensor. `noise` is that of the sensor at rest."""
 
     positions: tuple[HandPosition, ...]
@@ -111,7 +111,7 @@ class Course(ABC):
 
 
 @dataclass(frozen=True)
-class HandCourse(Course):
+class HandCourse(HandProgress):
     """The positions of an accelerometer so far. Orientations `skipped` (k, 3) are not wanted."""
 
     skipped: Array = field(default_factory=lambda: np.zeros((0, 3)))
