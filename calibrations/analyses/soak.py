@@ -204,7 +204,7 @@ HOUR_S = 3600.0
 
 
 @dataclass(frozen=True)
-class Course:
+class QuantityHistory:
     """One quantity of one axis at each reversal, in V or V/g, with white standard errors; times since power-on, s.
 
     No `state` if there are too few reversals to separate drift from noise.
@@ -238,7 +238,7 @@ class Soak:
 
     table: Table
     gaps: tuple[RecordGap, ...]
-    courses: Mapping[str, Course]  # bias-x, scale-x, ...
+    courses: Mapping[str, QuantityHistory]  # bias-x, scale-x, ...
 
     @cached_property
     def holds(self) -> Table:
@@ -320,7 +320,7 @@ def analyse_soak(table: Table, oven_c: float = 0.0) -> Soak:
     if not usable.any():
         raise TooFewRows(f"{table.source}: has no reversal yet; resume the run")
     reversals = table.rows(_complete(table, usable))
-    courses: dict[str, Course] = {}
+    courses: dict[str, QuantityHistory] = {}
     for axis in (axis for axis in table.axes if axis in AXES):
         tumbles = estimate_tumbles(reversals, axis)
         courses |= {f"{quantity}-{axis}": _course(quantity, axis, tumbles) for quantity in ("bias", "scale")}
@@ -345,7 +345,7 @@ def _complete(table: Table, usable: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return np.isin(paths, names[counts == counts.max()]) & usable
 
 
-def _course(quantity: str, axis: str, tumbles: list[Tumble]) -> Course:
+def _course(quantity: str, axis: str, tumbles: list[Tumble]) -> QuantityHistory:
     t_s = np.array([tumble.t_s for tumble in tumbles])
     if quantity == "bias":
         values, stds = np.array([(tumble.bias_v, tumble.bias_std_v) for tumble in tumbles]).T
@@ -353,7 +353,7 @@ def _course(quantity: str, axis: str, tumbles: list[Tumble]) -> Course:
         values = np.array([tumble.scale_v_per_g for tumble in tumbles])
         stds = np.abs(values) * np.array([tumble.scale_std for tumble in tumbles])
     state = fit_steady_state(t_s, values, stds) if len(t_s) >= FEWEST_APPROACH_VALUES else None
-    return Course(quantity, axis, t_s, values, stds, state)
+    return QuantityHistory(quantity, axis, t_s, values, stds, state)
 
 
 def _gaps(table: Table) -> tuple[RecordGap, ...]:

@@ -8,7 +8,7 @@ from itertools import groupby
 import numpy as np
 
 from calibrations.analyses.forecast import ForecastHistory, forecast_history, steady_time
-from calibrations.analyses.soak import AXES, HOUR_S, Course, Soak, SteadyState
+from calibrations.analyses.soak import AXES, HOUR_S, QuantityHistory, Soak, SteadyState
 from calibrations.analyses.soak import analyse_soak as soak_of
 from calibrations.criteria import COVERAGE_FACTOR, FEWEST_APPROACH_VALUES
 from calibrations.table import Table, std_column
@@ -146,7 +146,7 @@ def _forecast_results(forecasts: Mapping[str, ForecastHistory], output_unit: str
     return results
 
 
-def _drift(course: Course, state: SteadyState, output_unit: str) -> dict[str, Result]:
+def _drift(course: QuantityHistory, state: SteadyState, output_unit: str) -> dict[str, Result]:
     unit, full_scale = (output_unit, 1.0) if course.quantity == "bias" else ("", abs(state.final[0]))
     value, std = state.drift
     results = {

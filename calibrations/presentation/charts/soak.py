@@ -8,7 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from calibrations.analyses.forecast import ForecastHistory
-from calibrations.analyses.soak import HOUR_S, Course, Soak
+from calibrations.analyses.soak import HOUR_S, QuantityHistory, Soak
 from calibrations.presentation.chart import (
     AMBER,
     BAND,
@@ -155,7 +155,7 @@ def allan(soak: Soak) -> Chart:
     return single_chart(Panel(tuple(lines), x, y, legend="best"), 3.0)
 
 
-def _course(soak: Soak, course: Course, factor: float, label: str, title: str = "") -> Panel:
+def _course(soak: Soak, course: QuantityHistory, factor: float, label: str, title: str = "") -> Panel:
     """A panel with one quantity as the change from its final value, times `factor`."""
     state, final, colour = course.state, _final(course), COLOURS[course.axis]
     series: list[Series] = list(_gaps(soak))
@@ -177,7 +177,7 @@ def _course(soak: Soak, course: Course, factor: float, label: str, title: str = 
     return Panel((*series, *_steady(course)), Axis(TIME, low=_begin_h(soak)), y, title)
 
 
-def _steady(course: Course) -> Iterator[Rule | Note]:
+def _steady(course: QuantityHistory) -> Iterator[Rule | Note]:
     """The time from which the quantity is steady."""
     time, words = course.time_s, "steady state not reached"
     if time is not None:
@@ -202,11 +202,11 @@ def _begin_h(soak: Soak) -> float | None:
     return 0.0 if times_s.min() < np.ptp(times_s) else None
 
 
-def _final(course: Course) -> float:
+def _final(course: QuantityHistory) -> float:
     return course.state.final[0] if course.state else float(course.values[-1])
 
 
-def _shift_still(soak: Soak, course: Course) -> tuple[Array, Array]:
+def _shift_still(soak: Soak, course: QuantityHistory) -> tuple[Array, Array]:
     """The still record at 0 g, shifted onto the bias: the difference is load along z."""
     t_s, volts = _thin(soak.holds.time_s, soak.holds.output(course.axis))
     return t_s, volts - np.median(volts - np.interp(t_s, course.t_s, course.values))

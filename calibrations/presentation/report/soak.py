@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from calibrations.analyses.forecast import ForecastHistory, steady_time
-from calibrations.analyses.soak import HOUR_S, Course, RecordGap, Soak
+from calibrations.analyses.soak import HOUR_S, QuantityHistory, RecordGap, Soak
 from calibrations.presentation.chart import Picture
 from calibrations.presentation.charts.soak import soak_album
 from calibrations.presentation.document import Items, Page, Remark, Section, Table
@@ -153,7 +153,7 @@ def _figures(soak: Soak) -> list[tuple[str, str, str]]:
     return figures
 
 
-def _course(course: Course, output_unit: str) -> tuple[str, ...]:
+def _course(course: QuantityHistory, output_unit: str) -> tuple[str, ...]:
     """One row of the table; `output_unit` is the unit of the outputs: a bias in mV, a scale factor in mV/g."""
     state, (factor, unit) = course.state, in_milli(output_unit if course.quantity == "bias" else f"{output_unit}/g")
     name = _spelt(course.quantity)
