@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+from scipy.special import betaincc  # scipy.stats takes 0.4 s to load
 
+from calibrations.criteria import SIGNIFICANT
 from calibrations.free_forms.components import Component
 from calibrations.free_forms.search_result import SearchResult
 from calibrations.free_forms.shapes import climb
@@ -22,6 +24,8 @@ WARM_UPS = ("warm-up-bias", "warm-up-scale")
 SETTLED = 0.2  # of the record: the longest time constant of what has settled at its end, to less than 1 %
 TWO_MASSES = ((0.04, 0.12), (0.02, 0.06))  # of the record: time constants from which their search starts, and its steps
 JUMPS = 4.0  # excess kurtosis of a walk's increments: 500 of a Gaussian process keep within +-1
+SWINGS = 2  # periods in a record: the least that a swing has, and a drift has not
+FEWEST_WAVES = 8  # that the data determine: of fewer, the largest is large by chance
 UNSEEN = 0.3  # noise floors: a smaller residual of an effect does not show that a wider effect is the cause
 CLEARLY_LESS = 1.5  # ratio of the rms residuals of two effects from which one of them is not the cause
 SAME = 1e-8  # of a column: a smaller part that other columns do not span is rounding
@@ -92,12 +96,12 @@ def _forms_by_cause(result: SearchResult, place: str, names: Sequence[str]) -> d
     """
     forms: dict[str, list[Component]] = {}
     acting_causes = {result.component(name).cause for name in names}
-    jumps = any(_jumps(result, name) for name in names if "/walk-" in name)
+    no_walk = any(_is_no_walk(result, name) for name in names if "/walk-" in name)
     for comp in result.components:
         if comp.place == place and comp.cause and (comp.name in names or not _has_better_shape(comp, result, names)):
             smooth = comp.cause == "bias-drift" or (comp.cause == "warm-up-bias" and comp.name not in names)
             preferred = bool(comp.contains) and comp.contains in acting_causes
-            if (smooth and jumps) or ((_follows_many(comp) or preferred) and comp.name not in names):
+            if (smooth and no_walk) or ((_follows_many(comp) or preferred) and comp.name not in names):
                 continue
             forms.setdefault(comp.cause, []).append(comp)
     return forms
@@ -254,12 +258,36 @@ def _follows_many(comp: Component) -> bool:
     return comp.cause == "quantisation" or (comp.form is not None and comp.form.basis(0).kind in flexible_kinds)
 
 
+def _is_no_walk(result: SearchResult, name: str) -> bool:
+    """Whether a curve that a random walk follows is none: it jumps, or swings at one frequency."""
+    return _jumps(result, name) or _swings(result, name)
+
+
 def _jumps(result: SearchResult, name: str) -> bool:
     """Whether the increments of a random walk have tails that a Gaussian process does not have."""
     walk = result.component(name).jacobian(result.state) @ result.values.of[name]
     increments = np.diff(walk[np.argmax(np.ptp(walk, axis=1))])
     squares = (increments - np.mean(increments)) ** 2
     return bool(np.mean(squares**2) > (JUMPS + 3) * np.mean(squares) ** 2)
+
+
+def _swings(result: SearchResult, name: str) -> bool:
+    """Whether one wave of a random walk is larger than its prior allows beside the others (Fisher, 1929).
+
+    The waves of a walk are independent and, over their prior's deviation, of one size: the share of one of m waves in
+    the sum of their squares has a beta distribution. Waves of fewer than two periods, which a drift has as well, and
+    those that the data do not determine are not counted.
+    """
+    first, size = result.setting.base_size, result.sizes.variances[name]
+    block = result.gram.blocks[name]
+    columns = result.columns[:, first + block.start : first + block.stop]
+    determined = size * np.sum(columns**2, axis=0) > 1.0  # the data say more of the wave than the prior
+    determined[: 2 * SWINGS - 1] = False  # column k has (k + 1) / 2 periods
+    squares = result.sizes.of(result.gram, name)[determined] ** 2
+    m = len(squares)
+    if m < FEWEST_WAVES:
+        return False
+    return bool(m * betaincc(0.5, (m - 1) / 2, squares.max() / squares.sum()) < SIGNIFICANT)
 
 
 def _has_better_shape(comp: Component, result: SearchResult, names: Sequence[str]) -> bool:
