@@ -28,7 +28,7 @@ SECTOR_WIDTH_DEG = 30.0
 FINER_WIDTHS_DEG = (10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0)
 LEVELS = 12  # of a column, that a step could be at
 NEIGHBOURS = 200  # of a step, at most, in its refinement
-MOST_WAVES = 110  # along the record
+MOST_WAVES = 300  # along the record; at most one in two poses
 FINER_WAVES = 21
 
 
@@ -139,7 +139,7 @@ def _in_time(table: Table) -> Iterator[Pattern]:
         starts = np.quantile(t, np.linspace(0, 1, RAMPS + 2))
         for low, start, high in zip(starts[:-2], starts[1:-1], starts[2:], strict=True):
             yield replace(_ramp(t, start), finer=partial(_ramps, t, low, high))
-        for waves in np.arange(1.5, min(MOST_WAVES, table.n / 3), 0.5):
+        for waves in np.arange(1.5, min(MOST_WAVES, table.n / 2 - 1), 0.5):
             yield replace(_oscillation(t, waves), finer=partial(_oscillations, t, waves))
 
 
