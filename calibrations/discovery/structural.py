@@ -37,6 +37,7 @@ from calibrations.fitting.problem_kinds import make_problem
 from calibrations.fitting.requested_forms import BASE, effects_beyond_base
 from calibrations.free_forms.acting_places import ActingPlace
 from calibrations.free_forms.geometry import GEOMETRY, GeometryEffects
+from calibrations.free_forms.naming import NAMED_ALONE
 from calibrations.free_forms.place_names import PREFIX
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.search import search
@@ -112,7 +113,8 @@ class StructuralSearch:
     def alternatives(self) -> dict[str, tuple[str, ...]]:
         """By cause, the effects that the data cannot separate from it."""
         rivals_by_cause = {name: self.rivals.get(name, ()) for name in self.causes}
-        if self.candidates and self.causes == (self.candidates[0].name,):
+        of_other_form = {cause for place in self.places if place.share < NAMED_ALONE for cause in place.causes}
+        if self.candidates and self.causes == (self.candidates[0].name,) and not of_other_form & set(self.causes):
             name, rivals_alone = self.candidates[0].name, self.candidates[0].indistinguishable_from
             rivals_by_cause[name] = tuple(dict.fromkeys([*rivals_by_cause[name], *rivals_alone]))
         return {name: rivals for name, rivals in rivals_by_cause.items() if rivals}
@@ -204,7 +206,8 @@ def _without_idle_additions(
     Slow noise, or a free form beside them, describes their part as well, or it is the product of two causes, of which
     the search takes the sum. All are left out at once, or, where the unseen error grows by that, one after another.
     An `insignificant` cause may have lowered the error until a later one described its part too: each of these is left
-    out by itself. The effects that are `needed` are kept.
+    out by itself. The effects that are `needed` are kept. Beside a converter that rounds, the unseen error alone
+    decides: what was added before its steps may have followed them, and no linearised test is valid.
     """
     base, end = fits[0], fits[-1]
     remaining = {
@@ -212,7 +215,9 @@ def _without_idle_additions(
         for addition, (before, after) in zip(selected, pairwise(fits), strict=True)
         if addition.effect.name not in needed
     }
-    idle = [a for a in selected if remaining.get(a.effect.name, 0.0) >= IDLE]
+    if any(a.effect.rounds for a in selected):
+        remaining = {a.effect.name: 1.0 for a in selected if not a.effect.rounds}
+    idle = [a for a in reversed(selected) if remaining.get(a.effect.name, 0.0) >= IDLE]
     idle.sort(key=lambda a: remaining[a.effect.name], reverse=True)
     described = [a for a in selected if a.effect.name in insignificant and a not in idle]
     kept, without = selected, end

@@ -27,6 +27,7 @@ LEAST_UNKNOWN_SHARE = 0.05  # of the largest place's size: the part of such a pl
 READING_ERRORS = 1.5  # times the residual by the errors of noisy columns, whose size is uncertain
 CANCELLED = 3.0  # of what the base leaves: a larger place is cancelled by another one, and neither has the true curve
 FORM_OF = 0.25  # of another place's size: a place of which no more is its own may be a part of that place's form
+ANY_CURVE = {"output": "adc-nonlinearity"}  # effects that are any curve at their place: IEEE 1241
 
 PlaceSizes = Mapping[str, float]  # of each place, rms in noise floors
 
@@ -113,9 +114,12 @@ def _acting_place(
     least_own = min(LEAST_SIZE, max(LEAST_OWN, _excess(result))) if causes else LEAST_SIZE
     material = own >= least_own and size >= max(least_own, least)
     curve = curves[place].reshape(result.white.shape) * result.white
-    return ActingPlace(
+    acting_place = ActingPlace(
         place, size, own, largest, tuple(names), causes, share, material, gain, alternatives, curve, constants
     )
+    if acting_place.unknown and not alternatives and f"{place}/curve" in names and place in ANY_CURVE:
+        return replace(acting_place, causes=(ANY_CURVE[place],))
+    return acting_place
 
 
 def _least_size(result: SearchResult, place: str, sizes: PlaceSizes) -> float:
