@@ -121,7 +121,7 @@ def _without_remainders(best: SearchResult, descent: Callable[[SearchResult], Se
 def _likelier_without_one(result: SearchResult) -> SearchResult | None:
     """The search without one place or component, the smallest that makes it likelier; None if there is none."""
     active = result.active
-    places = {result.component(name).place for name in active}
+    places = dict.fromkeys(result.component(name).place for name in active)
     groups = [[n for n in active if result.component(n).place == place] for place in places]
     groups += [[name] for group in groups if len(group) > 1 for name in group]
     for group in sorted(groups, key=result.cost_without):
