@@ -58,6 +58,28 @@ def hummed(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array
     return v + VOLTS * np.sin(phase + np.array([0.0, 1.0]))
 
 
+def draughty(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
+    """A fan that switches in the room, fourteen times in the record: a random walk follows its wave."""
+    phase = 2 * np.pi * 14.3 * poses.t_s[:, None] / poses.t_s.max()
+    return v + VOLTS * np.sin(phase + np.array([0.0, 1.0]))
+
+
+def beating(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
+    """Mains, as the pace of the poses shows them: a wave in 2.7 poses differs from pose to pose as noise does."""
+    return v + VOLTS * np.sin(2 * np.pi * poses.t_s[:, None] / (2.7 * sampled.PERIOD_S) + np.array([0.0, 1.0]))
+
+
+def folding(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
+    """A folding converter: its error has several waves over the range of the outputs."""
+    return v + VOLTS * np.sin(2 * np.pi * v / 0.55)
+
+
+def truncated(means: Array) -> Array:
+    """The means as a logger writes them that cuts their digits off."""
+    step_v = 0.0126
+    return np.asarray(np.floor(means / step_v) * step_v)
+
+
 NAMELESS: dict[sampled.Cause, str] = {
     rippling: "temperature-bias",
     magnetised: "beta-bias",
@@ -140,12 +162,45 @@ def test_what_no_effect_describes_has_a_place_and_no_name(cause: sampled.Cause) 
     assert found.steps[-1].held_out_after < 1.15
 
 
+@pytest.mark.slow
+def test_a_wave_that_a_random_walk_follows_is_no_drift() -> None:
+    found = found_with(draughty)
+    assert (found.verdict, found.causes) == ("unexplained", ())
+    assert [place.name for place in found.findings.places if place.unknown] == ["time-bias"]
+
+
 @pytest.mark.release
 def test_a_fast_wave_in_time_is_no_drift() -> None:
     """A random walk follows a wave of 7 poses; the wave itself describes the residual better."""
     found = found_with(hummed)
     assert (found.verdict, found.causes) == ("unexplained", ())
     assert "oscillation in time, period 51" in found.judgement.text
+
+
+@pytest.mark.slow
+def test_a_wave_of_few_poses_is_no_noise() -> None:
+    """Without a filter the samples of a mean may be correlated, so that scatter of the poses may be noise."""
+    found = discover(replace(sampled.measured(4, beating), constants={}), read_model("linear"))
+    assert (found.verdict, found.causes) == ("unexplained", ())
+    assert "oscillation in time, period 18.9 s" in found.judgement.text
+
+
+@pytest.mark.slow
+def test_any_curve_of_the_converter_is_its_nonlinearity() -> None:
+    """Integral nonlinearity is every deviation of the characteristic from a line, the same for all channels."""
+    found = found_with(folding)
+    assert found.causes == ("adc-nonlinearity",)
+    assert found.alternatives == {}, "what resembles the effect's own formula is no alternative to another form"
+    assert found.steps[-1].name == "free:output"
+    assert found.steps[-1].held_out_after < 1.15
+
+
+@pytest.mark.slow
+def test_means_whose_digits_are_cut_off_need_one_effect() -> None:
+    """What the search finds in front of large steps may be their remainder: it does not lower the unseen error."""
+    rounded = replace(sampled.measured(4), constants={})
+    cut = rounded.with_outputs(truncated(rounded.outputs))
+    assert [step.name for step in discover(cut, read_model("linear")).steps] == ["quantisation"]
 
 
 @pytest.mark.slow
