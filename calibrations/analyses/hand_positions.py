@@ -21,10 +21,10 @@ from calibrations.analyses.stillness import BLOCK_S, NoiseAtRest
 from calibrations.design.orientations import (
     CENTRE_POSITIONS,
     FIRST_SIDES,
-    Next,
+    NextOrientation,
     directions_up,
+    is_informative,
     is_other_side,
-    is_worth,
     next_orientation,
 )
 from calibrations.effects.catalogue import catalogue
@@ -107,7 +107,7 @@ class HandProgress(ABC):
             return is_other_side(mean, self.outputs, float(self.noise.std.max()))
         wanted = np.array(self.wanted)
         direction = directions_up(np.vstack([self.outputs, mean]), np.vstack([self.directions, wanted]))[-1]
-        return is_worth(direction, wanted, self.directions)
+        return is_informative(direction, wanted, self.directions)
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ class HandCourse(HandProgress):
         return directions_up(self.outputs, np.array([p.stated_up for p in self.positions]).reshape(-1, 3))
 
     @cached_property
-    def next(self) -> Next:
+    def next(self) -> NextOrientation:
         """The most informative orientation."""
         last = self.directions[-1] if len(self.directions) else None
         return next_orientation(np.vstack([self.directions, self.skipped]), last, FIRST_SIDES + len(self.skipped))

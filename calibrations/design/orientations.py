@@ -35,7 +35,7 @@ ORIENTATIONS: Array = np.array(
 
 
 @dataclass(frozen=True)
-class Next:
+class NextOrientation:
     """The next orientation: `up` (3,) is the direction upward in the sensor's frame, one of ORIENTATIONS.
 
     `words`: the side that is upward. `turn`: how to turn the sensor from its last position; empty if that is not known.
@@ -56,7 +56,7 @@ def directions_up(outputs: Array, named_directions: Array) -> Array:
     return unit_vectors(outputs - sphere_centre(outputs))
 
 
-def next_orientation(measured: Array, last: Array | None = None, sides: int = FIRST_SIDES) -> Next:
+def next_orientation(measured: Array, last: Array | None = None, sides: int = FIRST_SIDES) -> NextOrientation:
     """The most informative orientation after those `measured` (n, 3). Among equals it is the nearest to `last` (3,).
 
     Of the first `sides` orientations each is a whole side, as long as there is one that is not taken.
@@ -67,7 +67,7 @@ def next_orientation(measured: Array, last: Array | None = None, sides: int = FI
     closeness = candidates @ (candidates[0] if last is None else last)
     best = np.flatnonzero(gains >= gains.max() * (1 - ALIKE))
     up = candidates[best[np.argmax(closeness[best])]]
-    return Next(up, orientation_words(up), "" if last is None else turn_words(last, up))
+    return NextOrientation(up, orientation_words(up), "" if last is None else turn_words(last, up))
 
 
 def gain(measured: Array, candidates: Array) -> Array:
@@ -77,7 +77,7 @@ def gain(measured: Array, candidates: Array) -> Array:
     return information_gain(harmonics(measured.reshape(-1, 3), degree)[:, None, :], rows, DOptimal())
 
 
-def is_worth(up: Array, proposed: Array, measured: Array) -> bool:
+def is_informative(up: Array, proposed: Array, measured: Array) -> bool:
     """Whether a rest with `up` (3,) upward is useful: it is the `proposed` one, or gives about as much information."""
     if up @ proposed >= np.cos(np.radians(NEAR_DEG)):
         return True

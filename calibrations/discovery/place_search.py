@@ -1,8 +1,8 @@
 """The search for missing effects of rows without stage angles: first the places that act, then their causes.
 
-It follows that of poses (`structural.py`) with what the residual shows of each place (`fitting/shown_forms.py`). Each
-place gets a free form. An effect of the catalogue is the cause of a place if the form is not needed beside it, or if it
-takes up most of the form. Else the place keeps its form, and its cause is unknown.
+It follows that of poses (`structural.py`) with what the residual shows of each place (`fitting/residual_forms.py`).
+Each place gets a free form. An effect of the catalogue is the cause of a place if the form is not needed beside it,
+or if it takes up most of the form. Else the place keeps its form, and its cause is unknown.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from calibrations.errors import TooFewRows
 from calibrations.fitting.determined import loses_parameters
 from calibrations.fitting.fit import Fit, refit
 from calibrations.fitting.noise_fit import deviance
-from calibrations.fitting.shown_forms import Shown, forms_at
+from calibrations.fitting.residual_forms import ResidualForms, forms_at
 from calibrations.free_forms.acting_places import ActingPlace
 from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.geometry import GEOMETRY, LINEAR_PART
@@ -94,7 +94,7 @@ def search_places(start: Fit, effects: Mapping[str, Effect]) -> StructuralSearch
 class _ActingForms:
     """The forms that act among those that a residual can show, with their sizes."""
 
-    shown: Shown
+    of_residual: ResidualForms
     sizes: Sizes
 
     @cached_property
@@ -102,18 +102,20 @@ class _ActingForms:
         """The names of the forms of each place."""
         names: dict[str, list[str]] = {}
         for name in self.sizes.variances:
-            names.setdefault(self.shown.forms[name].place, []).append(name)
+            names.setdefault(self.of_residual.forms[name].place, []).append(name)
         return names
 
     @property
     def effects(self) -> list[Effect]:
         """The free form of each place."""
-        return [free_form(tuple(self.shown.sized(n, self.sizes) for n in names)) for names in self.by_place.values()]
+        return [
+            free_form(tuple(self.of_residual.sized(n, self.sizes) for n in names)) for names in self.by_place.values()
+        ]
 
     def gain(self, place: str) -> float:
         """What the forms of a place together gain of -2 log likelihood, less their price."""
-        gained = self.shown.deviance(self._without(place)) - self.shown.deviance(self.sizes)
-        return gained - prices([self.shown.components[name] for name in self.by_place[place]])
+        gained = self.of_residual.deviance(self._without(place)) - self.of_residual.deviance(self.sizes)
+        return gained - prices([self.of_residual.components[name] for name in self.by_place[place]])
 
     @property
     def significant(self) -> _ActingForms:
@@ -125,12 +127,12 @@ class _ActingForms:
 
     def rivals(self, place: str) -> dict[str, Sizes]:
         """Other places whose forms explain as well what those of a place explain, and the sizes with them instead."""
-        components, reduced = self.shown.components, self._without(place)
+        components, reduced = self.of_residual.components, self._without(place)
         most = self.sizes.deviance + prices([components[n] for n in self.by_place[place]]) + CLOSE
         rivals = {}
-        for rival in dict.fromkeys(form.place for form in self.shown.forms.values()):
+        for rival in dict.fromkeys(form.place for form in self.of_residual.forms.values()):
             if rival not in self.by_place:
-                instead = self.shown.add([n for n, c in components.items() if c.place == rival], reduced)
+                instead = self.of_residual.add([n for n, c in components.items() if c.place == rival], reduced)
                 added = [components[n] for n in instead.variances if n not in reduced.variances]
                 if added and instead.deviance + prices(added) < most:
                     rivals[rival] = instead
@@ -153,7 +155,7 @@ class _ActingForms:
 
     def _without(self, place: str) -> Sizes:
         remaining = {n: v for n, v in self.sizes.variances.items() if n not in self.by_place[place]}
-        return estimate(self.shown.gram, remaining, {})
+        return estimate(self.of_residual.gram, remaining, {})
 
 
 def _fit_with_linear_effects(start: Fit, effects: Mapping[str, Effect]) -> Fit:
@@ -178,11 +180,11 @@ def _acting_forms(fit: Fit, places: Iterable[str]) -> _ActingForms:
     forms = {name: form for place in places for name, form in forms_at(place, fit).items()}
     scatter, least = 1.0, 1.0 if fit.problem.white is not None else 0.0
     for _ in range(ROUNDS):
-        shown = Shown.of(fit.in_white_noise(), forms, scatter=scatter)
-        settled, scatter = scatter, max(least, scatter * shown.excess(shown.selected))
-        if max(scatter / settled, settled / scatter) < SETTLED or not shown.selected.variances:
+        residual_forms = ResidualForms.of(fit.in_white_noise(), forms, scatter=scatter)
+        settled, scatter = scatter, max(least, scatter * residual_forms.excess(residual_forms.selected))
+        if max(scatter / settled, settled / scatter) < SETTLED or not residual_forms.selected.variances:
             break
-    return _ActingForms(shown, shown.selected).significant
+    return _ActingForms(residual_forms, residual_forms.selected).significant
 
 
 def _score(fit: Fit) -> float:

@@ -18,7 +18,7 @@ from calibrations.discovery.findings import Step
 from calibrations.discovery.search import cost, first_order_cost
 from calibrations.discovery.significance import chance, of_search
 from calibrations.fitting.fit import Fit
-from calibrations.fitting.shown_forms import Shown, form_columns, forms_at
+from calibrations.fitting.residual_forms import ResidualForms, form_columns, forms_at
 from calibrations.free_forms.acting_places import FORM_OF
 from calibrations.free_forms.bases import Basis, Line, Spline, spline
 from calibrations.free_forms.form import Factor, Form
@@ -88,18 +88,20 @@ def _one_of_slow_pair(end: Fit, names: list[str]) -> list[str]:
     for pair in SLOW:
         if not all(place in at for place in pair):
             continue
-        shown_forms = [
-            Shown.of(end.in_white_noise(), forms_at(place, end), apart=at[rival]) for place, rival in (pair, pair[::-1])
+        of_pair = [
+            ResidualForms.of(end.in_white_noise(), forms_at(place, end), tested_effect=at[rival])
+            for place, rival in (pair, pair[::-1])
         ]
-        likelier = min(shown_forms, key=lambda shown: shown.selected.deviance)
+        likelier = min(of_pair, key=lambda forms: forms.selected.deviance)
         if _takes_up(likelier):
-            names = [name for name in names if name != likelier.apart]
+            names = [name for name in names if name != likelier.tested_effect]
     return names
 
 
-def _takes_up(shown: Shown) -> bool:
+def _takes_up(forms: ResidualForms) -> bool:
     """Whether the forms explain most of the signal of the effect that is fitted apart."""
-    return shown.gain_apart(shown.selected) < max(ENTER, (1 - MOSTLY) * shown.gain_apart(shown.without_forms))
+    alone = forms.gain_of_tested_effect(forms.without_forms)
+    return forms.gain_of_tested_effect(forms.selected) < max(ENTER, (1 - MOSTLY) * alone)
 
 
 def _is_smaller(growth: float, larger: float) -> bool:
@@ -112,7 +114,7 @@ def _follows(end: Fit, name: str, larger: list[str]) -> bool:
     forms = {key: form for place in places if place in DRIVERS for key, form in forms_at(place, end).items()}
     if not forms:
         return False
-    return _takes_up(Shown.of(end.in_white_noise(), forms, apart=name))
+    return _takes_up(ResidualForms.of(end.in_white_noise(), forms, tested_effect=name))
 
 
 def _cost_of_removal(end: Fit, name: str, forms: Array) -> tuple[float, int]:

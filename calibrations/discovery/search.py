@@ -148,7 +148,8 @@ def in_final_floor(path: Path, end: Fit) -> Path:
 def _next(present: Fit, ranked: list[RowCandidate]) -> ForwardStep | None:
     """The step with the best candidate that is significant and, refitted, lowers the error on unseen poses.
 
-    If there is none and the residual is large, the stronger candidate of the best pair: the next step adds the other.
+    If there is none, the residual is large and the orientations are not known: the stronger candidate of the best pair;
+    the next step adds the other.
     """
     for c in ranked[:3]:
         if c.p_value >= SIGNIFICANT or _explained_share(present, c.excess_after) < LEAST_SHARE / 2:

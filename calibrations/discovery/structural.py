@@ -88,7 +88,7 @@ class StructuralSearch:
         `ranked`: the candidates on `start`, if they are known.
         """
         floor = fits[-1].noise.scatter
-        start, fits = start.in_floor(floor), [each.in_floor(floor) for each in fits]
+        start, fits = start.in_floor(floor), [fitted.in_floor(floor) for fitted in fits]
         steps = _steps(start, freed, fits[0], effects)
         steps += [Step(a.effect.name, *pair) for a, pair in zip(added, pairwise(fits), strict=True)]
         if not ranked:

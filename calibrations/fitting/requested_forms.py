@@ -14,7 +14,7 @@ import numpy as np
 
 from calibrations.effects import Effect
 from calibrations.errors import ModelError
-from calibrations.fitting.shown_forms import SMALLEST, estimate_by_residual
+from calibrations.fitting.residual_forms import SMALLEST, estimate_by_residual
 from calibrations.fitting.solution import Solution
 from calibrations.free_forms.bases import Harmonics, Line
 from calibrations.free_forms.chain import ModelEffects, State, start, state_at

@@ -50,7 +50,7 @@ def search(
     2. If that leaves more than noise, or many components: all forms at once. This finds causes of another form.
     3. If the history acts: loops that differ from place to place as well. They resemble most curves with a corner, so
        they have to gain clearly.
-    4. If that leaves more than noise: steps over the output, where there are any beside all smooth forms.
+    4. If that leaves more than noise: jumps over the output too, where the residual of all smooth forms has any.
     5. If flicker of any size is likelier than the components over time: all again with such flicker. This is left out
        if a misfit may look like flicker: with effects of the given model, a large residual, or no random walks.
 
@@ -62,8 +62,8 @@ def search(
     """
     setting = Setting(data, white, model_effects)
     best = _search_from_all(setting, general, reason) if origin is None else _continue(origin, setting, general, reason)
-    asked = general and noise_known and not model_effects.columns.shape[2]
-    if not asked or not LEAST_MISFIT < best.ratio < MOST_MISFIT or not _is_flicker(best):
+    may_be_flicker = general and noise_known and not model_effects.columns.shape[2]
+    if not may_be_flicker or not LEAST_MISFIT < best.ratio < MOST_MISFIT or not _is_flicker(best):
         return best
     in_flicker = _search_from_all(replace(setting, flicker=True), general, f"{reason}again with flicker noise, ")
     return min(best, in_flicker, key=lambda end: end.criterion)
@@ -91,9 +91,9 @@ def _search_from_all(setting: Setting, general: bool, reason: str) -> SearchResu
         looped = descend(setting, general, f"{reason}with loops", catalogue_first=True, loops=True)
         best = looped if looped.criterion < best.criterion - SPILL * abs(best.criterion) else best
     if best.ratio >= NOISE_ALONE and setting.first_jumps is not None:
-        for first, way in ((True, "effects first"), (False, "all forms together")):
-            step = f"{reason}with steps of a converter, {way}"
-            jumping = descend(setting, general, step, catalogue_first=first, jumps=True)
+        for catalogue_first, words in ((True, "effects first"), (False, "all forms together")):
+            step = f"{reason}with steps of a converter, {words}"
+            jumping = descend(setting, general, step, catalogue_first=catalogue_first, jumps=True)
             best = min(best, jumping, key=lambda end: end.criterion)
     step, jumps = f"{reason}without components that are not needed", STEPS in best.active
     return _without_remainders(best, lambda origin: descend(setting, general, step, jumps=jumps, origin=origin))

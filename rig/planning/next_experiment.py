@@ -157,8 +157,8 @@ def choose_best(experiments: Sequence[Experiment], criteria: Sequence[str]) -> E
         enough = [e for e in experiments if _will_separate(e, probability)]
         if enough:
             return min(enough, key=lambda e: (-len(e.separates), e.duration_s or 0.0))
-    telling = [e for e in experiments if _per_minute(e) > 0]
-    return max(telling, key=_per_minute, default=None)
+    separating = [e for e in experiments if _per_minute(e) > 0]
+    return max(separating, key=_per_minute, default=None)
 
 
 def _will_separate(e: Experiment, probability: str) -> bool:

@@ -66,9 +66,9 @@ class Live:
             run, table = self.measure(following)
             used_s = (measurements[-1].used_s if measurements else 0.0) + (following.duration_s or 0.0)
             measurements.append(Measurement(following, run, discover(table, self.model, self.effects), used_s))
-            telling = self._separating_experiment(measurements)
-            following = None if stands(measurements) else self._next_experiment(telling, measurements)
-            discovered = replace(measurements[-1].discovery, next_experiment=telling)
+            separating = self._separating_experiment(measurements)
+            following = None if is_confirmed(measurements) else self._next_experiment(separating, measurements)
+            discovered = replace(measurements[-1].discovery, next_experiment=separating)
             measurements[-1] = replace(measurements[-1], discovery=discovered, following=following)
             yield measurements[-1]
 
@@ -85,8 +85,8 @@ class Live:
         menu = _new_experiments((*ADDITIONS, *MENU), measurements)
         return choose_experiment(dispute, discovered.next_experiment, self.bench, self.bench_file, menu, (TOGETHER,))
 
-    def _next_experiment(self, telling: Experiment | None, measurements: Sequence[Measurement]) -> Experiment | None:
-        """The next experiment: `telling` if its poses fit the other data, else poses in between; None without time.
+    def _next_experiment(self, separating: Experiment | None, measurements: Sequence[Measurement]) -> Experiment | None:
+        """The next experiment: `separating` if its poses fit the other data, else poses in between; None without time.
 
         A short sweep comes before a much longer experiment: the room may show the same as the oven.
         """
@@ -95,23 +95,25 @@ class Live:
             (self.planned(e) for e in possible(_new_experiments(SWEEPS_BETWEEN, measurements), self.bench, left_s)),
             None,
         )
-        if telling is None or telling.duration_s is None or telling.duration_s > left_s:
+        if separating is None or separating.duration_s is None or separating.duration_s > left_s:
             return intermediate
-        if intermediate is not None and (intermediate.duration_s or 0.0) < FEW * telling.duration_s:
+        if intermediate is not None and (intermediate.duration_s or 0.0) < FEW * separating.duration_s:
             return intermediate
         return (
-            telling if _new_experiments([telling], measurements) and gives_poses(telling, self.bench) else intermediate
+            separating
+            if _new_experiments([separating], measurements) and gives_poses(separating, self.bench)
+            else intermediate
         )
 
 
-def stands(measurements: Sequence[Measurement]) -> bool:
+def is_confirmed(measurements: Sequence[Measurement]) -> bool:
     """Whether the last data have confirmed the explanation of the data before, or one of its alternatives."""
     if len(measurements) < 2 or measurements[-1].discovery.undecided:
         return False
     previous, present = measurements[-2].discovery, measurements[-1].discovery
     explanations = {*previous.causes, *(name for names in previous.alternatives.values() for name in names)}
-    is_confirmed = previous.verdict in (present.verdict, "ambiguous") and _kind(previous) == _kind(present)
-    return is_confirmed and set(present.causes) <= explanations and len(present.causes) == len(previous.causes)
+    same_verdict = previous.verdict in (present.verdict, "ambiguous") and _kind(previous) == _kind(present)
+    return same_verdict and set(present.causes) <= explanations and len(present.causes) == len(previous.causes)
 
 
 def _kind(discovered: Discovery[Fit]) -> list[str]:

@@ -19,7 +19,7 @@ from calibrations.loop import discover
 from calibrations.model.file import read_model
 from drivers.world.config import WorldConfig
 from rig.bench import read_bench
-from rig.runs.live import STANDARD, Live, stands
+from rig.runs.live import STANDARD, Live, is_confirmed
 from tests.hidden import rigs
 from tests.hidden.defects import DEFECTS
 from tests.hidden.quick_rig import QuickRig
@@ -53,7 +53,7 @@ def compared(defect: str, seed: int) -> Case:
     found = done[-1].discovery
     standard = is_right(defect, discover(table, model, effects))
     return Case(
-        defect, seed, is_right(defect, found), stands(done), standard, standard_s / done[-1].used_s, found.causes
+        defect, seed, is_right(defect, found), is_confirmed(done), standard, standard_s / done[-1].used_s, found.causes
     )
 
 

@@ -9,8 +9,8 @@ from calibrations.design.orientations import (
     ORIENTATIONS,
     directions_up,
     find_covered,
+    is_informative,
     is_other_side,
-    is_worth,
     name_orientation,
     next_orientation,
     orientation_words,
@@ -82,9 +82,9 @@ def test_turns_are_described_in_words(last: tuple[float, ...], up: tuple[float, 
 def test_another_position_is_taken_if_it_tells_about_as_much() -> None:
     taken = chosen(8)
     wanted = next_orientation(taken, taken[-1]).up
-    assert is_worth(wanted, wanted, taken)
-    assert not is_worth(taken[0], wanted, taken)
-    others = [up for up in ORIENTATIONS if up @ wanted < 0.8 and is_worth(up, wanted, taken)]
+    assert is_informative(wanted, wanted, taken)
+    assert not is_informative(taken[0], wanted, taken)
+    others = [up for up in ORIENTATIONS if up @ wanted < 0.8 and is_informative(up, wanted, taken)]
     assert others  # a person who took another edge or corner need not turn back
 
 

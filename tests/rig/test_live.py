@@ -18,7 +18,7 @@ from calibrations.model.file import read_model
 from rig.bench import read_bench
 from rig.record import Record
 from rig.record.measured import table_of
-from rig.runs.live import FIRST, Live, Measurement, stands
+from rig.runs.live import FIRST, Live, Measurement, is_confirmed
 from tests.hidden.quick_rig import QuickRig
 from tests.hidden.rigs import IDEAL
 from tests.rig.conftest import Rig
@@ -104,20 +104,20 @@ def test_an_explanation_stands_when_later_data_leave_it_alone() -> None:
     one = found(causes=("hysteresis",))
     doubtful = changed(one, alternatives={"hysteresis": ("dead-zone",)})
     assert doubtful.verdict == "ambiguous"
-    assert not stands(done(one))
-    assert stands(done(one, one))
-    assert stands(done(doubtful, one))
-    assert stands(done(doubtful, changed(one, causes=("dead-zone",))))
-    assert not stands(done(one, doubtful))
-    assert not stands(done(one, changed(one, causes=("bias-drift",))))
-    assert not stands(done(one, changed(one, causes=("hysteresis", "bias-drift"))))
+    assert not is_confirmed(done(one))
+    assert is_confirmed(done(one, one))
+    assert is_confirmed(done(doubtful, one))
+    assert is_confirmed(done(doubtful, changed(one, causes=("dead-zone",))))
+    assert not is_confirmed(done(one, doubtful))
+    assert not is_confirmed(done(one, changed(one, causes=("bias-drift",))))
+    assert not is_confirmed(done(one, changed(one, causes=("hysteresis", "bias-drift"))))
 
 
 def test_what_is_unexplained_stands_when_the_pattern_stays() -> None:
     steps = [found(spoilt=True, left=f"step at t = {t} s") for t in (900, 917)]
     assert [step.verdict for step in steps] == ["unexplained", "unexplained"]
-    assert stands(done(*steps))
-    assert not stands(done(steps[0], changed(steps[1], left="5th harmonic of the stage angle beta")))
+    assert is_confirmed(done(*steps))
+    assert not is_confirmed(done(steps[0], changed(steps[1], left="5th harmonic of the stage angle beta")))
 
 
 def loop(world: dict[str, Any], minutes: float) -> list[Measurement]:

@@ -21,7 +21,7 @@ from rig.cli.terminal.watch import watching
 from rig.cli.terminal.words import discovery, parameters, warning
 from rig.record import Record
 from rig.record.measured import MeasuredRun
-from rig.runs.live import FIRST, STANDARD, Live, Measurement, stands
+from rig.runs.live import FIRST, STANDARD, Live, Measurement, is_confirmed
 from rig.runs.runner import start
 from rig.services.provenance import write_model
 from rig.services.request import Request, effects_of
@@ -120,7 +120,7 @@ def progress(measurements: list[Measurement], time_s: float) -> str:
 
 def ending(measurements: list[Measurement], time_s: float) -> str:
     """The reason for the end."""
-    if stands(measurements):
+    if is_confirmed(measurements):
         return "The last measurement did not change the result."
     if measurements[-1].discovery.next_experiment is not None:
         return "The open question needs more time than remains, or another bench."
@@ -141,7 +141,11 @@ def document(measurements: list[Measurement], standard_s: float, out: Path | Non
         }
         for m in measurements
     ]
-    times = {"rig_time_s": measurements[-1].used_s, "standard_rig_time_s": standard_s, "stands": stands(measurements)}
+    times = {
+        "rig_time_s": measurements[-1].used_s,
+        "standard_rig_time_s": standard_s,
+        "stands": is_confirmed(measurements),
+    }
     runs = {"runs": [m.run for m in measurements], "experiments": experiments}
     return discovery_document(measurements[-1].discovery, str(out) if out else None) | runs | times
 

@@ -48,33 +48,33 @@ SMALLEST = 1e-3  # noise floors: what a form adds that the data do not show
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class ResidualForms:
     """The forms that a residual can show: products of their columns with the model's own (`gram`), and the inputs.
 
-    columns  whitened [base, forms, residual], (rows, base + forms + 1)
-    apart    an effect of the model whose parameters are no part of the base
-    scatter  standard deviation of the rows without forms, in that of the fit's noise
+    columns        whitened [base, forms, residual], (rows, base + forms + 1)
+    tested_effect  an effect of the model whose parameters are no part of the base
+    scatter        standard deviation of the rows without forms, in that of the fit's noise
     """
 
     fit: Solution
     forms: Mapping[str, Form]
     gram: Gram
     columns: Array
-    apart: str = ""
+    tested_effect: str = ""
     scatter: float = 1.0
 
     @staticmethod
-    def of(fit: Solution, forms: Mapping[str, Form], apart: str = "", scatter: float = 1.0) -> Shown:
-        """The forms by name and one effect (`apart`), tested together with the other parameters of a fit."""
-        J, own = fit.whitened[:, 1:], fit.problem.layout.of_effect(apart)
+    def of(fit: Solution, forms: Mapping[str, Form], tested_effect: str = "", scatter: float = 1.0) -> ResidualForms:
+        """The forms by name and one effect (`tested_effect`), tested together with the other parameters of a fit."""
+        J, own = fit.whitened[:, 1:], fit.problem.layout.of_effect(tested_effect)
         parts = {name: fit.noise.whiten(form_columns(fit, form)) for name, form in forms.items()}
-        parts |= {apart: J[:, own]} if apart else {}
+        parts |= {tested_effect: J[:, own]} if tested_effect else {}
         ends = np.cumsum([0, *(part.shape[1] for part in parts.values())])
         blocks = {name: slice(int(a), int(b)) for name, a, b in zip(parts, ends[:-1], ends[1:], strict=True)}
         left = fit.whitened[:, 0] - J[:, own] @ fit.theta[own]
         X = np.hstack([J[:, ~own], *parts.values(), left[:, None]]) / scatter
         X, g = scale_components(X, _gram(fit, X, ~own, blocks))
-        return Shown(fit, forms, g, X, apart, scatter)
+        return ResidualForms(fit, forms, g, X, tested_effect, scatter)
 
     @cached_property
     def components(self) -> Mapping[str, Component]:
@@ -117,9 +117,9 @@ class Shown:
         variance = max(quadratic / free_rows, least)
         return quadratic / variance + free_rows * float(np.log(variance)) + sizes.deviance - quadratic
 
-    def gain_apart(self, sizes: Sizes) -> float:
+    def gain_of_tested_effect(self, sizes: Sizes) -> float:
         """Twice the gain in log-likelihood by the effect, with forms of these sizes in the model."""
-        return gains(self.gram, sizes, [self.apart])[self.apart][0]
+        return gains(self.gram, sizes, [self.tested_effect])[self.tested_effect][0]
 
     def sized(self, name: str, sizes: Sizes) -> Form:
         """A form with its fitted size, and without the columns that contribute nothing."""
@@ -159,13 +159,13 @@ def estimate_by_residual(before: Solution, place: str) -> Effect:
 
     One form is always kept, however small: a person asked for it, and at a size near zero it changes nothing.
     """
-    shown = Shown.of(before.in_white_noise(), forms_at(place, before))
-    sizes = shown.selected
+    residual_forms = ResidualForms.of(before.in_white_noise(), forms_at(place, before))
+    sizes = residual_forms.selected
     if not sizes.variances:
-        gained = gains(shown.gram, sizes, list(shown.forms))
+        gained = gains(residual_forms.gram, sizes, list(residual_forms.forms))
         best = max(gained, key=lambda name: gained[name][0])
-        sizes = estimate(shown.gram, {best: max(gained[best][1], SMALLEST**2)}, {best: SMALLEST**2})
-    return free_form(tuple(shown.sized(name, sizes) for name in sizes.variances))
+        sizes = estimate(residual_forms.gram, {best: max(gained[best][1], SMALLEST**2)}, {best: SMALLEST**2})
+    return free_form(tuple(residual_forms.sized(name, sizes) for name in sizes.variances))
 
 
 def _component(name: str, form: Form) -> Component:
