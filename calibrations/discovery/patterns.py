@@ -152,7 +152,8 @@ def _oscillation(t: Array, waves: float) -> Pattern:
     period = (float(np.ptp(t)) or 1.0) / waves
     rate = 2 * np.pi / period
     expression = f"a*sin({rate:.6g}*t) + b*cos({rate:.6g}*t)"
-    seconds = f"{period:.3g}" if period < 100 else f"{period:.0f}"
+    many = waves >= 100  # so that neighbouring waves have periods of their own
+    seconds = f"{period:.4g}" if many else f"{period:.3g}" if period < 100 else f"{period:.0f}"
     return Pattern(
         f"oscillation in time, period {seconds} s", _waves(rate * t), expression, price=PATTERN_BETTER, slow=True
     )
