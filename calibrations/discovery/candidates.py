@@ -84,16 +84,11 @@ def best_pair(base: Fit, ranked: list[RowCandidate]) -> tuple[RowCandidate, RowC
     best, lowest_p = None, 1.0
     for (a, b), gain in zip(pairs, joint, strict=True):
         rank = a.rank + b.rank
-        p = chance_of_gain(gain, base.residual.size, rank, max(_freedom(base, rank), 1)) * len(pairs)
+        free = base.residual.size - base.jacobian.shape[2] - rank - base.problem.smooth.size
+        p = chance_of_gain(gain, base.residual.size, rank, max(free, 1)) * len(pairs)
         if p < lowest_p:
             best, lowest_p = (a, b), p
     return best if lowest_p < SIGNIFICANT else None
-
-
-def _freedom(base: Fit, rank: int) -> float:
-    """Degrees of freedom of the residual with `rank` parameters more, each channel without the smooth columns."""
-    smooth = base.problem.smooth.shape[1] * len(base.channels)
-    return float(min(base.residual.size - base.jacobian.shape[2] - rank - smooth, base.noise.freedom))
 
 
 def chance_of_gain(twice_gain: float, rows: int, rank: int, free: float) -> float:
@@ -232,7 +227,7 @@ def _candidate(
     base, rank = screen.fit, basis.shape[1]
     smooth = base.problem.smooth.shape[1]
     score = screen.statistic(basis)
-    free = _freedom(base, rank)
+    free = min(base.residual.size - base.jacobian.shape[2] - rank - smooth * len(base.channels), base.noise.freedom)
     p_score = float(fdtrc(rank, free, score / rank)) if smooth else 1.0
     p_refitted = chance_of_gain(smooth_gain, base.residual.size, rank, free)
     tests, searched = 2 if smooth else 1, effect.searched(base.table)

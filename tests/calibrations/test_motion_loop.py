@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from calibrations.discovery import candidates
 from calibrations.documents import comparison_document
-from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import fit
 from calibrations.loop import compare, diagnose, discover
 from calibrations.model import Model
@@ -175,22 +171,3 @@ def test_a_sensor_that_points_the_other_way_has_a_negative_scale_factor() -> Non
     found = discover(shaken.record(shaken.TWO, 20.0, scale_v=(-1.0, -1.0), delay_s=1e-3), LINEAR)
     assert found.causes == ("sampling-delay",)
     assert value(found.end.model, "scale-factor", "scale")[0] == pytest.approx(-1.0, rel=0.01)
-
-
-def test_a_pair_of_effects_is_tested_with_the_freedom_of_all_channels(monkeypatch: pytest.MonkeyPatch) -> None:
-    base = fit(LINEAR, shaken.record(shaken.TWO, 3.0, 1, turn_deg=(0.0, 1.5, 2.0)))
-    names = ("axis-nonorthogonality", "quadratic-nonlinearity", "scale-factor-asymmetry")
-    ranked = candidates.candidates(base, {name: catalogue()[name] for name in names})
-    freedoms: list[tuple[int, float]] = []
-
-    def noted(gain: float, rows: int, rank: int, free: float) -> float:
-        freedoms.append((rank, free))
-        return 1.0
-
-    monkeypatch.setattr(candidates, "chance_of_gain", noted)
-    noise = replace(base.noise, ratio=np.zeros_like(base.noise.ratio))  # white noise has the freedom of all rows
-    assert candidates.best_pair(replace(base, noise=noise), ranked) is None
-    channels, rows = base.residual.shape
-    attitudes = base.problem.smooth.shape[1]
-    assert (attitudes, len(freedoms)) == (1, 3)
-    assert {rank + free for rank, free in freedoms} == {channels * (rows - attitudes) - len(base.theta)}
