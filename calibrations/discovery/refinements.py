@@ -9,7 +9,7 @@ Source  Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425: the misfit of a m
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from calibrations.discovery.findings import Step
 from calibrations.discovery.search import cost, first_order_cost
 from calibrations.discovery.significance import chance, of_search
 from calibrations.fitting.fit import Fit
-from calibrations.fitting.residual_forms import ResidualForms, form_columns, forms_at
+from calibrations.fitting.residual_forms import OF_FORCE, OF_TABLE, ResidualForms, form_columns, forms_at
 from calibrations.free_forms.acting_places import FORM_OF
 from calibrations.free_forms.bases import Basis, Line, Spline, spline
 from calibrations.free_forms.form import Factor, Form
@@ -28,18 +28,7 @@ from calibrations.free_forms.selection import ENTER
 from calibrations.table import Array
 
 BASE = ("bias", "scale-factor")
-DRIVERS: dict[str, tuple[str, Factor]] = {
-    "own-response": ("own", ""),
-    "cross-response": ("cross", ""),
-    "z-response": ("out-of-plane", ""),
-    "scale-over-cross": ("cross", "force"),
-    "scale-over-z": ("out-of-plane", "force"),
-    "temperature-bias": ("temperature", ""),
-    "temperature-scale": ("temperature", "force"),
-    "time-bias": ("time", ""),
-    "time-scale": ("time", "force"),
-    "output": ("output", ""),
-}
+DRIVERS: Mapping[str, tuple[str, Factor]] = {**OF_FORCE, **OF_TABLE, "output": ("output", "")}
 LINEAR = ("cross-response", "z-response", "scale-over-cross", "scale-over-z")  # whose linear parts are geometry
 SLOW = (("temperature-bias", "time-bias"), ("temperature-scale", "time-scale"))  # places that go the same way
 LEAD_S, LEADS = 15.0, 4.0  # by which the sensor may be ahead of its thermometer, and how often that
