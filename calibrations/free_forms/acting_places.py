@@ -117,7 +117,7 @@ def _acting_place(
     acting_place = ActingPlace(
         place, size, own, largest, tuple(names), causes, share, material, gain, alternatives, curve, constants
     )
-    if acting_place.unknown and not alternatives and f"{place}/curve" in names and place in ANY_CURVE:
+    if place in ANY_CURVE and f"{place}/curve" in names and acting_place.unknown and not alternatives:
         return replace(acting_place, causes=(ANY_CURVE[place],))
     return acting_place
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from calibrations.analyses.control_chart import Chart, control_chart
 from calibrations.criteria import BASELINE_RUNS, FEWEST_RUNS
-from calibrations.text import add_prefix, concise
+from calibrations.text import add_prefix, concise, concise_in_prefix
 from drivers.errors import did_you_mean
 from rig.errors import RecordError, UnknownRun
 from rig.record import Run
@@ -97,8 +97,7 @@ def _distance(quantity: ControlledQuantity, k: int) -> str:
     distance = float(chart.values[k] - chart.centre)
     if chart.sigma > 0:
         return f"{distance / chart.sigma:+.1f} sigma"
-    factor, unit = add_prefix(quantity.unit, distance)
-    return f"{factor * distance:+.3g} {unit.replace('µ', 'u')}".rstrip()
+    return f"{'+' if distance > 0 else ''}{concise_in_prefix(distance, None, quantity.unit)}"
 
 
 @dataclass(frozen=True)
