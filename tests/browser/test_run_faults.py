@@ -13,6 +13,7 @@ from playwright.sync_api import BrowserContext, Page, expect
 from rig.bench.file import DEMO
 from tests.browser.test_every_page import GRAVE, SETTLED, WHOLE, axe
 from tests.browser.test_run_page import begin, phase, tick
+from tests.slow import before_release
 
 pytestmark = pytest.mark.slow
 
@@ -29,7 +30,7 @@ def accessible(page: Page, options: Mapping[str, Any] | None = None) -> None:
     assert [(each["id"], each["nodes"][0]["html"], each["nodes"][0]["failureSummary"]) for each in found] == []
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", *before_release(["dark"])])
 def test_a_silent_stage_is_told_and_the_run_is_kept(
     served: Callable[..., Any], visitor: Callable[[], BrowserContext], tmp_path: Path, scheme: Any
 ) -> None:

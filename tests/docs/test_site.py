@@ -63,7 +63,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "html"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_site_needs_nothing_from_the_network(site: Path) -> None:
     pages = sorted(site.rglob("*.html"))
     assert len(pages) > 100
@@ -76,7 +76,7 @@ def test_the_site_needs_nothing_from_the_network(site: Path) -> None:
         assert not re.search(r"(url\(|@import)\s*[\"']?(https?:)?//", sheet.read_text("utf-8")), sheet
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("notebook", TUTORIALS, ids=lambda path: path.stem)
 def test_notebooks_of_the_site_show_their_results(site: Path, notebook: Path) -> None:
     text = notebook.read_text("utf-8")

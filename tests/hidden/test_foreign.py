@@ -33,13 +33,13 @@ def test_one_cause_of_each_form_is_named_and_removed(tmp_path: Path, step: int) 
     assert np.mean(np.array(errors) <= 1.25) >= 0.9, [(s.truth, s.answer) for s in found if s.answer.held_out > 1.25]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_sensor_without_a_cause_gets_no_name(tmp_path: Path) -> None:
     found = [searched(tmp_path, 100 + number, [], 0.0) for number in range(12)]
     assert not any(s.answer.causes for s in found)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_what_no_catalogue_holds_gets_no_name(tmp_path: Path) -> None:
     found = [searched(tmp_path, 200 + number, [cause], 10.0) for number, cause in enumerate(UNKNOWN)]
     assert sum(bool(s.answer.causes) for s in found) <= 1, [s.answer for s in found]

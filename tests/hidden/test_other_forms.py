@@ -162,7 +162,7 @@ def test_what_no_effect_describes_has_a_place_and_no_name(cause: sampled.Cause) 
     assert found.steps[-1].held_out_after < 1.15
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_wave_that_a_random_walk_follows_is_no_drift() -> None:
     found = found_with(draughty)
     assert (found.verdict, found.causes) == ("unexplained", ())
@@ -195,7 +195,7 @@ def test_any_curve_of_the_converter_is_its_nonlinearity() -> None:
     assert found.steps[-1].held_out_after < 1.15
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_means_whose_digits_are_cut_off_need_one_effect() -> None:
     """What the search finds in front of large steps may be their remainder: it does not lower the unseen error."""
     rounded = replace(sampled.measured(4), constants={})

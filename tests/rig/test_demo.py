@@ -121,7 +121,7 @@ def test_the_demonstration_finds_what_was_hidden(rig: Rig, tmp_path: Path) -> No
     assert "<html" in Path(document["report"]).read_text(encoding="utf-8")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_realistic_demonstration_tells_what_it_did_not_find(rig: Rig, tmp_path: Path) -> None:
     document = rig("demo", "--realistic", "--folder", str(tmp_path / "demo"), "--json").document
     rows = document["hidden_faults"]
