@@ -20,7 +20,7 @@ from calibrations.compensation.graph import ONE, ZERO, Node, look_up, number, po
 from calibrations.compensation.trace import NodeArray, NotTraced, RunTime, as_nodes, as_traced
 from calibrations.effects import Values
 from calibrations.effects.logged import sensor_temperature_c
-from calibrations.free_forms.bases import Clips, Line, Products, Ramp, Spline
+from calibrations.free_forms.bases import Clips, Products, Ramp, Spline, StraightLine
 from calibrations.free_forms.effect import FreeForm, coefficients_of
 from calibrations.free_forms.form import CROSS, Form
 from calibrations.table import Array
@@ -119,7 +119,7 @@ def _part(form: Form, u: Array, a: Sequence[Node], v: Node, table: RunTime, k: i
         x = _driver(form, a, v, table, k)
         if isinstance(basis, Spline):
             f = look_up(spline_table(basis, u), x) if len(u) else number(0.0)
-        elif isinstance(basis, Line):
+        elif isinstance(basis, StraightLine):
             slope = float(np.sum(u)) / basis.half_width
             f = number(slope) * x + number(-slope * (basis.low + basis.high) / 2)
         elif isinstance(basis, Ramp):

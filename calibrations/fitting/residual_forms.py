@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from calibrations.effects import Effect
 from calibrations.fitting.solution import Solution
-from calibrations.free_forms.bases import Clips, Line, Products, Settling, spline
+from calibrations.free_forms.bases import Clips, Products, Settling, StraightLine, spline
 from calibrations.free_forms.components import GENERAL, PRODUCT, Component
 from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.form import CROSS, Factor, Form
@@ -195,10 +195,11 @@ def _forms(place: str, table: Table, force: Array) -> Sequence[Form]:
         driver, factor = OF_TABLE[place]
         x = table.column("temperature_c") if driver == "temperature" else table.time_s
         ends = float(x.min()), float(x.max())
-        found = [Form(place, "line", driver, (Line(*ends),), factor)]
+        found = [Form(place, "line", driver, (StraightLine(*ends),), factor)]
         found.append(Form(place, "curve", driver, (spline(x, INTERVALS[driver]),), factor))
         if driver == "temperature" and "t_s" in table:
-            found += [Form(place, name, driver, (Line(*ends),), factor, lead_s=lead) for name, lead in LEADS_S.items()]
+            line = StraightLine(*ends)
+            found += [Form(place, name, driver, (line,), factor, lead_s=lead) for name, lead in LEADS_S.items()]
         if driver == "time":
             span = ends[1] - ends[0] or 1.0
             found.append(Form(place, "settling", driver, (Settling(ends[0], span, span / len(x), AGES),), factor))
@@ -209,10 +210,10 @@ def _forms(place: str, table: Table, force: Array) -> Sequence[Form]:
         return [Form(place, "curve", "force", (Products(DEGREE),))]
     if place == "column:std":
         squares = [table.column(name) ** 2 for name in table.std_names]
-        lines = tuple(Line(float(q.min()), float(q.max())) for q in squares)
+        lines = tuple(StraightLine(float(q.min()), float(q.max())) for q in squares)
         return [Form(place, "line", "variance", lines)]
     x = table.column(place.removeprefix("column:"))
-    line, curve = (Line(float(x.min()), float(x.max())),), (spline(x, COLUMN_INTERVALS),)
+    line, curve = (StraightLine(float(x.min()), float(x.max())),), (spline(x, COLUMN_INTERVALS),)
     return [
         Form(place, "line", place, line),
         Form(place, "curve", place, curve),

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator
 
 from calibrations.geometry.error_table import Point
 from drivers.philtec_d63 import SIMULATED as SIMULATED_CURVE
-from drivers.philtec_d63 import Curve
+from drivers.philtec_d63 import CalibrationCurve
 from drivers.transport.address import Address
 from drivers.transport.faults import Fault
 
@@ -144,7 +144,7 @@ class Displacement(Strict):
     `curve` is a YAML file in the folder of the bench file, `simulated`, or the curve. `read_bench` gives the curve.
     """
 
-    curve: Curve
+    curve: CalibrationCurve
     side: Literal["near", "far"] = "near"
     direction: Literal[1, -1] = 1
 
@@ -155,9 +155,9 @@ class Displacement(Strict):
 
 
 @cache
-def _simulated_curve() -> Curve:
+def _simulated_curve() -> CalibrationCurve:
     """The curve of the simulated sensor, which every simulated bench has."""
-    return Curve.from_file(SIMULATED_CURVE)
+    return CalibrationCurve.from_file(SIMULATED_CURVE)
 
 
 class Folders(Strict):

@@ -40,7 +40,7 @@ REMEDY = (
 
 
 @dataclass
-class Steps:
+class StepCounts:
     """The steps from a sample of an output to the next one, and those without a change."""
 
     total: int = 0
@@ -106,7 +106,7 @@ class StuckOutputs:
     """What the poses so far say about the outputs of the sensor. `kind` is that of the run."""
 
     kind: str = "poses"
-    _steps: dict[str, Steps] = field(default_factory=dict)  # these three by output
+    _steps: dict[str, StepCounts] = field(default_factory=dict)  # these three by output
     _equal: dict[str, EqualRun] = field(default_factory=dict)
     _constant: dict[str, Constant] = field(default_factory=dict)
 
@@ -139,7 +139,7 @@ class StuckOutputs:
         ends = np.append(np.flatnonzero(np.diff(values) != 0), len(values) - 1)  # of runs of equal samples
         counts = np.diff(ends, prepend=-1)
         first_s = samples.start_s + (ends - counts + 1) / samples.rate_hz
-        steps, earlier = self._steps.setdefault(name, Steps()), self._equal.get(name)
+        steps, earlier = self._steps.setdefault(name, StepCounts()), self._equal.get(name)
         if earlier is not None and earlier.value == values[0]:
             counts[0] += earlier.count
             first_s[0] = earlier.since_s

@@ -75,7 +75,7 @@ MECHANISMS: Mapping[str, tuple[str, ...]] = {
 
 
 @dataclass(frozen=True)
-class Curve:
+class OutputChange:
     """A change of the output, (n, channels), free of bias and scale factor.
 
     `span`: of an effect, the change of the output by a change of its values, (n, channels, values).
@@ -98,8 +98,8 @@ class Group:
     `std`: standard uncertainty of the size of the effects together.
     """
 
-    faults: tuple[Curve, ...]
-    effects: tuple[Curve, ...] = ()
+    faults: tuple[OutputChange, ...]
+    effects: tuple[OutputChange, ...] = ()
     std: float | None = None
 
     @property
@@ -118,7 +118,7 @@ class Faults:
     """All groups of faults, the largest first. `extra`: effects that belong to no fault. Sizes in `unit`."""
 
     groups: tuple[Group, ...]
-    extra: tuple[Curve, ...]
+    extra: tuple[OutputChange, ...]
     floor: float
     unit: str
 
@@ -189,8 +189,8 @@ def hidden_faults(bench: Bench, fitted: Fit, start: Fit) -> Faults:
 
 
 def group_steps(
-    faults: Sequence[Curve], effects: Sequence[Curve], floor: float
-) -> tuple[tuple[Group, ...], tuple[Curve, ...]]:
+    faults: Sequence[OutputChange], effects: Sequence[OutputChange], floor: float
+) -> tuple[tuple[Group, ...], tuple[OutputChange, ...]]:
     """The groups, the largest first, and the effects of none. Free forms join the effects at their place."""
     of_catalogue = [e for e in effects if e.span is not None]
     groups: list[Group] = []
@@ -203,7 +203,7 @@ def group_steps(
 
 
 def _join_fault(
-    fault: Curve, makers: Sequence[Curve], groups: Sequence[Group], effects: Sequence[Curve]
+    fault: OutputChange, makers: Sequence[OutputChange], groups: Sequence[Group], effects: Sequence[OutputChange]
 ) -> list[Group]:
     """The groups with one fault more. It joins the groups that have one of its makers, and makes them one."""
     shared = [g for g in groups if any(e in makers for e in g.effects)]
@@ -212,9 +212,9 @@ def _join_fault(
     return [*(g for g in groups if g not in shared), joined]
 
 
-def _makers(fault: Curve, effects: Sequence[Curve], floor: float) -> list[Curve]:
+def _makers(fault: OutputChange, effects: Sequence[OutputChange], floor: float) -> list[OutputChange]:
     """The fewest effects whose values, if changed, make the curve of a fault; none where no effects do."""
-    selected: list[Curve] = []
+    selected: list[OutputChange] = []
     remaining_size, unseen = fault.size, MATERIAL * floor
     while remaining_size > max(WHOLE * fault.size, unseen):
         remaining = [e for e in effects if e not in selected]
@@ -226,7 +226,7 @@ def _makers(fault: Curve, effects: Sequence[Curve], floor: float) -> list[Curve]
     return selected if remaining_size <= max(LARGEST_REST * fault.size, unseen) else []
 
 
-def _remainder_rms(fault: Curve, effects: Sequence[Curve]) -> float:
+def _remainder_rms(fault: OutputChange, effects: Sequence[OutputChange]) -> float:
     """Rms of the part of a fault's curve that the effects cannot describe."""
     spans = [e.span.reshape(fault.curve.size, -1) for e in effects if e.span is not None]
     columns_ = np.hstack(spans)
@@ -236,7 +236,7 @@ def _remainder_rms(fault: Curve, effects: Sequence[Curve]) -> float:
     return float(rms(curve - columns_ @ np.linalg.lstsq(columns_, curve, rcond=None)[0]))
 
 
-def _judge_group(group: Group, effects: Sequence[Curve]) -> list[Group]:
+def _judge_group(group: Group, effects: Sequence[OutputChange]) -> list[Group]:
     """The group with the free forms of its effects, if its effects agree with its faults; else its faults alone."""
     places = {place_of_effect(e.name) for e in group.effects}
     of_place = [e for e in effects if e.span is None and place_of_effect(e.name) in places]
@@ -247,16 +247,16 @@ def _judge_group(group: Group, effects: Sequence[Curve]) -> list[Group]:
     return [Group((fault,)) for fault in group.faults]
 
 
-def _sum_curves(curves: Sequence[Curve]) -> Curve:
-    return Curve(", ".join(c.name for c in curves), np.sum([c.curve for c in curves], axis=0))
+def _sum_curves(curves: Sequence[OutputChange]) -> OutputChange:
+    return OutputChange(", ".join(c.name for c in curves), np.sum([c.curve for c in curves], axis=0))
 
 
-def _are_alike(fault: Curve, effect: Curve) -> bool:
+def _are_alike(fault: OutputChange, effect: OutputChange) -> bool:
     same_size = effect.size < SIZE_RATIO * fault.size and fault.size < SIZE_RATIO * effect.size
     return same_size and _correlation(fault, effect) >= ALIKE
 
 
-def _correlation(a: Curve, b: Curve) -> float:
+def _correlation(a: OutputChange, b: OutputChange) -> float:
     length = float(np.linalg.norm(a.curve) * np.linalg.norm(b.curve))
     return float(np.sum(a.curve * b.curve)) / length if length > 0 else 0.0
 
@@ -284,7 +284,7 @@ def _simulate_poses(config: WorldConfig, seed: int, table: Table) -> Table:
 
 def _fault(
     name: str, settings: Sequence[str], config: WorldConfig, seed: int, table: Table, poses: Table
-) -> Curve | None:
+) -> OutputChange | None:
     """A mechanism's curve; None if the rig does not have it."""
     ideal = WorldConfig.ideal()
     changes = [(path, _value(ideal, path)) for path in settings]
@@ -293,7 +293,7 @@ def _fault(
     faultless = config
     for path, value in changes:
         faultless = faultless.changed(_nested_setting(path, value))
-    return Curve(name, _free(poses, poses.outputs - _simulate_poses(faultless, seed, table).outputs))
+    return OutputChange(name, _free(poses, poses.outputs - _simulate_poses(faultless, seed, table).outputs))
 
 
 def _value(config: Any, path: str) -> float:
@@ -307,17 +307,17 @@ def _nested_setting(path: str, value: float) -> dict[str, Any]:
     return {head: _nested_setting(tail, value) if tail else value}
 
 
-def _effect(name: str, fitted: Fit, poses: Table) -> Curve:
+def _effect(name: str, fitted: Fit, poses: Table) -> OutputChange:
     """An effect's curve in the fitted model; with its span, if it is no free form."""
     curve = _contribution([name], fitted, poses)
     if name.startswith(PREFIX):
-        return Curve(name, curve(fitted.theta))
+        return OutputChange(name, curve(fitted.theta))
     span = []
     for k in np.flatnonzero(fitted.problem.layout.of_effect(name)):
         theta = fitted.theta.copy()
         theta[k] += STEP * fitted.problem.layout.typical[k]
         span.append(curve(theta) - curve(fitted.theta))
-    return Curve(name, curve(fitted.theta), np.stack(span, axis=2))
+    return OutputChange(name, curve(fitted.theta), np.stack(span, axis=2))
 
 
 def _contribution(names: Sequence[str], fitted: Fit, poses: Table) -> Callable[[Array], Array]:
