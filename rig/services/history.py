@@ -235,7 +235,7 @@ def stale(life: History, calibration: Calibration, age_days: float) -> str | Non
     if last and life.due is not None and day.date() > life.due:
         return f"it was due on {life.due}"
     if abs(age_days) > STALE_DAYS:
-        return f"it is {abs(age_days):.0f} days {'older' if age_days > 0 else 'younger'} than that day"
+        return f"it was measured {abs(age_days):.0f} days {'before' if age_days > 0 else 'after'} that day"
     return None
 
 

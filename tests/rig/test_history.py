@@ -76,7 +76,7 @@ def test_the_closest_to_a_day_and_whether_it_is_stale(rig: Rig, years: None) -> 
     assert [end in out for end, out in zip((", the same day.", ", 1 day before."), near, strict=True)] == [True, True]
     old = rig("history", "17", "--at", "2026-01-01")
     assert old.status == 1
-    assert "This calibration is stale: it is 671 days older than that day." in old.out
+    assert "This calibration is stale: it was measured 671 days before that day." in old.out
     due = rig("history", "17", "--at", "2024-12-01", "--limit", "bias-x=0.0003")
     assert "This calibration is stale: it was due on 2024" in due.out
 
