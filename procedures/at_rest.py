@@ -1,7 +1,7 @@
 """Positions at rest of a sensor in a hand: the part that all procedures by hand have in common.
 
-The noise at rest is measured first. Then the program says which attitude it needs, sees when the sensor is at rest in a
-new one, takes the position, and ends when the uncertainties are small enough.
+The noise at rest is measured first. Then the program shows which attitude it needs, detects when the sensor is at rest
+in a new one, records the position, and ends when the uncertainties are small enough.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ NOISE_WINDOWS = 20  # windows of rest that show the noise
 LONGEST_WAIT_S = 86_400.0
 FEWEST = 12  # positions: nine parameters, and three that check them
 SIDES = 6  # the first positions
-TRIES = 2  # rests at known positions before another orientation is wanted
+TRIES = 2  # rests at known positions before another orientation is requested
 FLAT = (0.0, 0.0, 1.0)
 
 
@@ -76,8 +76,8 @@ class Goal:
         worst, parameter = course.uncertainty
         if not parameter:
             return ""
-        known, wanted = f"{self.shown * worst:.2g} {self.unit}", f"{self.shown * self.target:g} {self.unit}"
-        return "; ".join(filter(None, (f"{parameter} is known to {known}, wanted {wanted}", course.doubt)))
+        reached, target = f"{self.shown * worst:.2g} {self.unit}", f"{self.shown * self.target:g} {self.unit}"
+        return "; ".join(filter(None, (f"{parameter}: standard uncertainty {reached}, target {target}", course.doubt)))
 
 
 def outputs_of(samples: Samples, names: Sequence[str]) -> NDArray[np.float64]:
@@ -146,8 +146,8 @@ def _find_next_rest(
 ) -> Samples | None:
     """The next rest at a new position. The first window of a rest is left out: the hand has just let go.
 
-    None after TRIES rests at known positions: an earlier position was not the one that the person was told, and is the
-    wanted one. Raises NoAnswer after `wait_s` without one.
+    None after TRIES rests at known positions: an earlier position was not the requested one, but is the one that is
+    requested now. Raises NoAnswer after `wait_s` without one.
     """
     windows: list[Samples] = []
     doing, refusals = PresentStep(rig), 0
@@ -168,10 +168,10 @@ def _find_next_rest(
             return candidate
         else:
             refusals += doing.step is not HandStep.KNOWN
-            doing.say(HandStep.KNOWN, f"this position is known already; needed: {course.words}")
+            doing.say(HandStep.KNOWN, f"this position is measured already; next: {course.words}")
             windows = windows[1:]
     raise NoAnswer(
-        f"no new position for {goal.wait_s:g} s; needed: {course.words}; {doing.text}; resume the run to go on"
+        f"no new position for {goal.wait_s:g} s; next: {course.words}; {doing.text}; resume the run to continue"
     )
 
 

@@ -116,9 +116,10 @@ class Watch:
             elif course.is_new(outputs_of(join_samples(self.rest[1:]), FORCES).mean(axis=0)):
                 return
             else:
-                doing.say(HandStep.KNOWN, f"the sensor lies as before; needed: {course.words}")
+                doing.say(HandStep.KNOWN, f"the sensor has the same orientation as before; next: {course.words}")
         raise NoAnswer(
-            f"no new position for {self.goal.wait_s:g} s; needed: {course.words}; {doing.text}; resume the run to go on"
+            f"no new position for {self.goal.wait_s:g} s; next: {course.words}; {doing.text}; "
+            "resume the run to continue"
         )
 
     def keep(self, words: str) -> None:

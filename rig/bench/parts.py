@@ -88,7 +88,7 @@ class Sensor(Strict):
     filter_corner_hz: float | None = None
     latitude_deg: float | None = Field(
         default=None, ge=-90, le=90
-    )  # of the laboratory: a gyroscope feels the earth turn
+    )  # of the laboratory: a gyroscope measures the earth's rotation
     height_m: float | None = Field(default=None, ge=-500, le=9000)  # of the laboratory above the sea
     heading_deg: float | None = Field(default=None, ge=-360, le=360)  # of the base's x axis, clockwise from true north
     world: dict[str, Any] = {}

@@ -21,7 +21,7 @@ from rig.runs.signals import stoppable
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
 
-AHEAD = 3  # chunks on their way for each thread of a worker
+AHEAD = 3  # chunks in transit for each thread of a worker
 PATIENCE_S = 10  # for a scheduler to answer
 FEW = 10  # messages that Dask keeps of each connection: they hold the tables that were sent, and memory would grow
 
@@ -69,10 +69,10 @@ def connect_workers(scheduler: str | None, workers: int | None) -> Iterator[Clie
 
 
 def start_cluster(workers: int | None) -> LocalCluster:
-    """A local cluster whose processes do not hear Ctrl-C and the end of a terminal: the command alone handles these.
+    """A local cluster whose processes ignore Ctrl-C and the end of a terminal: only the command handles these.
 
-    A cluster that has half started cannot be closed, so `stoppable` lets a signal wait for the end of this function.
-    Raises FleetError if a worker ends before it has started.
+    A cluster cannot be closed during its start, so `stoppable` lets a signal wait for the end of this function. Raises
+    FleetError if a worker ends before it has started.
     """
     from distributed import LocalCluster
 

@@ -201,7 +201,7 @@ def is_noise(model: Model | None) -> bool:
 
 
 def _has_channels_alone(path: Path) -> bool:
-    """No more of a file is read than its header."""
+    """Only the header of a file is read."""
     with path.open(encoding="utf-8", errors="replace") as file:
         return channels_alone(file.read(LONGEST_BEGINNING))
 

@@ -29,10 +29,10 @@ from rig.record.values import KeptPose
 from rig.services.tables import BESIDE, INFLUENCES, load
 
 SENSOR = tuple(chain(*OUTPUTS))  # channels of the accelerometer's outputs
-TIME_TOLERANCE = 0.5  # sampling intervals by which a sample may be off before that is a gap
+TIME_TOLERANCE = 0.5  # in sampling intervals: a larger deviation of a time is a gap
 DISAGREE = 0.01  # of two rates
 AXIS = re.compile(r"(v|a|g|m|)([xyz])(|_v)")  # of a channel, by its name
-SENSED_UNITS = {  # what outputs in these units are better known in
+SENSED_UNITS = {  # more usual units for these
     "m/s^2": Sensed(1 / STANDARD_GRAVITY, "g"),
     "m/s2": Sensed(1 / STANDARD_GRAVITY, "g"),
     "deg/s": Sensed(3600.0, "deg/h"),
@@ -88,10 +88,10 @@ def repairs(samples: SampleStream, n: int) -> Iterable[str]:
     """How the samples were changed before the analysis, and what limits them."""
     if samples.closed:
         missing = sum(length for _, length in samples.closed)
-        gaps = "a gap is" if len(samples.closed) == 1 else f"{len(samples.closed)} gaps are"
+        gaps = "a gap" if len(samples.closed) == 1 else f"{len(samples.closed)} gaps"
         yield (
-            f"{gaps} closed up, {missing:.3g} s in all: long averaging times are too short by up to "
-            f"{100 * missing * samples.rate_hz / n:.2g} %."
+            f"The analysis joins the samples across {gaps}, {missing:.3g} s in total: long averaging times are too "
+            f"short by up to {100 * missing * samples.rate_hz / n:.2g} %."
         )
     if samples.uneven_s:
         yield (
@@ -140,10 +140,10 @@ def agree_on_rate(measured: float | None, stated_hz: float, source: str) -> floa
 # A still table as a stream; its times must be evenly spaced.
 
 
-MOST_MISSING = 0.1  # of a record, in gaps that are closed up
-WHOLE = 0.1  # of a step, by which steps may be off whole numbers of them where single samples were lost
+MOST_MISSING = 0.1  # of a record, in gaps across which samples are joined
+WHOLE = 0.1  # of a sampling interval: tolerance of a step about a whole number of intervals, if single samples are lost
 FEW_GAPS = 0.01  # of all steps
-UNEVENNESS = 1e-3  # of a record, by which times may be off an even row, as where samples arrive in bursts
+UNEVENNESS = 1e-3  # of a record: tolerance of its times about evenly spaced ones; samples can arrive in bursts
 EVEN_REMEDY = "record again with evenly spaced samples (interpolated samples have less white noise than the sensor)"
 
 
@@ -237,7 +237,7 @@ def _longest_stretch_text(far: NDArray[np.intp], n: int) -> str:
 
 
 def _check_gaps(gaps: Sequence[tuple[float, float]], length_s: float, source: str) -> None:
-    """Raises DataError where too much is missing to close the gaps up."""
+    """Raises DataError if too much is missing to join the samples across the gaps."""
     missing = sum(length for _, length in gaps)
     if missing > MOST_MISSING * length_s:
         longest = max(gaps, key=lambda gap: gap[1])
@@ -296,7 +296,7 @@ def _still_blocks(measured: MeasuredRun, stream: SampleStream) -> Iterator[NDArr
 
 
 def _supply_and_temperature(recorded: KeptPose) -> Iterator[tuple[str, list[Array]]]:
-    """Temperature of a block, and supply, as means of a second each: in blocks that take no room."""
+    """Temperature and supply of a block, as means of one second each, to use little memory."""
     samples, n = recorded.samples, len(recorded.samples.volts)
     temperature, supply = INFLUENCES
     if recorded.temperature_c is not None:

@@ -288,7 +288,7 @@ def test_a_run_without_poses_is_made_by_keyboard_and_leads_to_its_results(workbe
 def test_a_bench_is_chosen_before_a_run_and_stays_during_it(workbench: Workbench) -> None:
     page = workbench.visit("/run?procedure=hand-positions&target_g=0.002")
     expect(page.get_by_text("adc: no input is wired to ax, ay, az")).to_be_visible()
-    expect(page.get_by_text("Another bench of the list Measure on may have it.")).to_be_visible()
+    expect(page.get_by_text("Another bench in the list Measure on may have it.")).to_be_visible()
     bench(page, "demonstration rig")
     expect(page.get_by_text("positioner")).to_have_count(0)  # the demonstration rig has none
     expect(page.get_by_label("Procedure")).to_have_value(re.compile("^hand-positions"))

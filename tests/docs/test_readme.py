@@ -71,7 +71,7 @@ def test_a_log_of_another_format_is_imported_as_written(tmp_path: Path, follow: 
 
 @pytest.mark.slow
 def test_the_first_story_works_as_written_and_makes_the_picture(tmp_path: Path, follow: Callable[..., Any]) -> None:
-    follow(commands(section("docs/how-to/commands.md", "Find what is missing")))
+    follow(commands(section("docs/how-to/commands.md", "Find missing effects")))
     made, shown = tmp_path / "pictures" / "waterfall.svg", ROOT / "docs" / "falling-error.svg"
     assert labels(made) == labels(shown), "docs/falling-error.svg: make it again as docs/how-to/commands.md says"
     assert shown.stat().st_size < 200_000

@@ -65,8 +65,10 @@ def test_the_directions_so_far_go_with_the_guidance(calm: Book) -> None:
     assert isinstance(last, Guidance)
     assert not last.moves
     assert "0.001" not in last.text
-    assert "wanted 1 mg" in last.text
-    assert re.search(r"; the (scale factor of [xyz]|bias of [xyz]|nonorthogonality of . and .) is known to", last.text)
+    assert "target 1 mg" in last.text
+    assert re.search(
+        r"; the (scale factor of [xyz]|bias of [xyz]|nonorthogonality of . and .): standard uncertainty ", last.text
+    )
     assert np.array(last.taken) == pytest.approx(ups(calm), abs=0.02)
 
 
@@ -94,7 +96,7 @@ def test_a_position_that_is_known_is_not_taken_twice() -> None:
     world = HandheldWorld(WorldConfig.ideal(), 1, Handheld(hand=CALM))
     rig, book = session(world)
     book.guide = book.guided.append
-    with pytest.raises(NoAnswer, match="this position is known already"):
+    with pytest.raises(NoAnswer, match="this position is measured already"):
         hand_positions(replace(rig, by_hand=HandAnalysis()), wait_s=15.0)
     assert len(book.dwells) == 1
 

@@ -40,7 +40,7 @@ def test_a_calm_hand_needs_no_more_rests_than_the_accelerometer_does(calm: Book)
     assert len(calm.blocks) == 2 * FEWEST - 1  # a turn before each rest but the first
     assert calm.asked == ["at-rest"]
     assert calm.world.now_s < 150
-    assert "wanted 0.2 %" in calm.guided[-1].text
+    assert "target 0.2 %" in calm.guided[-1].text
 
 
 def test_the_person_is_told_that_the_first_turn_begins_with_a_rest(calm: Book) -> None:

@@ -189,7 +189,7 @@ def test_a_question_is_asked_until_its_answer_makes_sense() -> None:
 
     status = carried_out("sweep", SMALL, person, attended=True)
     assert status.state == "complete"
-    assert refused == ["'perhaps' is no answer; answer with yes or no", "perhaps"]
+    assert refused == ["'perhaps' is not a valid answer; answer with yes or no", "perhaps"]
 
 
 def test_what_cannot_be_run_is_told_as_well() -> None:

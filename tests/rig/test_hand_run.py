@@ -220,7 +220,7 @@ def test_a_stopped_run_goes_on_with_its_positions(rig_home: Path) -> None:
 def test_an_accuracy_that_was_not_reached_is_a_result_that_is_missing(rig: Rig, rig_home: Path) -> None:
     ended = rig(*RUN, "--target-g", "1e-6", "--most-positions", "12")
     assert ended.status == 1
-    assert "mg only, wanted 0.001 mg; take more positions, or longer rests" in ended.err
+    assert "mg, target 0.001 mg; take more positions, or longer rests" in ended.err
     assert "uncertainty" not in ended.document["results"]
 
 
@@ -229,10 +229,10 @@ def test_a_target_that_is_reached_within_the_error_of_an_uncertainty_is_reached(
     percent: float, is_reached: bool
 ) -> None:
     measured = cast(MeasuredRun, SimpleNamespace(run=SimpleNamespace(settings={"target_percent": 0.2})))
-    known = f"gyro-scale-factor.x is known to {percent:g} % only"
-    found = _uncertainty(measured, percent, known, "turns", TARGET_PERCENT)["uncertainty"]
+    reached = f"gyro-scale-factor.x: standard uncertainty {percent:g} %"
+    found = _uncertainty(measured, percent, reached, "turns", TARGET_PERCENT)["uncertainty"]
     assert found == (
-        Result(percent, "%") if is_reached else Missing(f"{known}, wanted 0.2 %; take more turns, or longer rests")
+        Result(percent, "%") if is_reached else Missing(f"{reached}, target 0.2 %; take more turns, or longer rests")
     )
 
 

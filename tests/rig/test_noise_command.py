@@ -244,7 +244,7 @@ def test_short_gaps_are_closed_up_and_told(rig: Rig, folder: Path) -> None:
     t_s[2000:] += 1.0
     ended = rig("noise", table(folder / "gap.csv", t_s, vx_v=samples()), "--json")
     assert ended.done().document["rate_hz"] == pytest.approx(50)
-    assert "a gap is closed up, 1 s in all" in ended.err
+    assert "across a gap, 1 s in total" in ended.err
 
 
 def test_times_of_a_computer_that_samples_reach_in_bursts(rig: Rig, folder: Path) -> None:

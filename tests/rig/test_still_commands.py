@@ -214,7 +214,7 @@ def test_a_small_gap_is_closed_and_that_is_said(rig: Rig, folder: Path, samples:
     write("gap.csv", t_s, vx_v=samples[0])
     ended = rig("diagnose", "gap.csv")
     assert ended.status == 0
-    assert "a gap is closed up, 5 s in all" in ended.err
+    assert "across a gap, 5 s in total" in ended.err
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""demo: find three hidden faults of a simulated sensor, and compare them with what was hidden."""
+"""demo: find three hidden faults of a simulated sensor, and compare them with the true ones."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ MEASURING_SHARE = 0.4  # share of the bar
 @click.option("--realistic", is_flag=True, help="The default rig with all its faults at once; takes minutes.")
 @json_option
 def demo_command(folder: Path | None, realistic: bool, as_json: bool) -> None:
-    """Measure a simulated sensor with three hidden faults, find them, and compare them with what was hidden.
+    """Measure a simulated sensor with three hidden faults, find them, and compare them with the true ones.
 
     --realistic is the second act: the default simulated rig, a standard sweep of 518 poses, and all faults at once.
     """

@@ -29,7 +29,7 @@ LOCAL_HOSTS = ("127.0.0.1", "localhost", "::1")
     help="Address to listen at. Another address opens the workbench to other machines.",
 )
 @click.option("--no-open", is_flag=True, help="Print the address and open no browser.")
-@click.option("--new-token", is_flag=True, help="Replace the kept token: older addresses and open pages end.")
+@click.option("--new-token", is_flag=True, help="Make a new token: older addresses and open pages stop working.")
 @click.option(
     "--bench",
     "bench_files",
