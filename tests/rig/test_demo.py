@@ -78,7 +78,7 @@ def test_faults_that_share_an_effect_are_one_group_if_they_agree_together() -> N
     assert not any(g.effects for g in group_steps(hidden, [opposite, zero], 0.01)[0])
 
 
-def test_many_effects_of_a_group_stand_in_several_lines() -> None:
+def test_many_effects_of_a_group_are_wrapped_over_several_lines() -> None:
     fault = OutputChange("tilt", np.ones((4, 1)))
     effects = tuple(effect(f"effect-of-the-stage-{k}", np.ones((4, 1)), np.ones((4, 1))) for k in range(5))
     lines = Faults((Group((fault,), effects, 1.0),), (), 0.01, "V").text().splitlines()
@@ -111,7 +111,7 @@ def _exists(path: str) -> bool:
 
 
 @pytest.mark.slow
-def test_the_demonstration_finds_what_was_hidden(rig: Rig, tmp_path: Path) -> None:
+def test_the_demonstration_finds_the_hidden_faults(rig: Rig, tmp_path: Path) -> None:
     document = rig("demo", "--folder", str(tmp_path / "demo"), "--json").document
     assert {row["fault"]: row["effect"] for row in document["hidden_faults"]} == SAME
     assert all(abs(row["found"] - row["size"]) < 4 * row["std"] for row in document["hidden_faults"])
@@ -122,7 +122,7 @@ def test_the_demonstration_finds_what_was_hidden(rig: Rig, tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-def test_the_realistic_demonstration_tells_what_it_did_not_find(rig: Rig, tmp_path: Path) -> None:
+def test_the_realistic_demonstration_names_the_faults_that_it_did_not_find(rig: Rig, tmp_path: Path) -> None:
     document = rig("demo", "--realistic", "--folder", str(tmp_path / "demo"), "--json").document
     rows = document["hidden_faults"]
     large = [row for row in rows if row["size_over_floor"] >= MATERIAL]

@@ -145,7 +145,7 @@ def test_a_run_finds_the_scale_factors_and_the_misalignment_of_a_gyroscope(
 
 @pytest.mark.slow
 @pytest.mark.sockets
-def test_turns_that_were_interrupted_go_on(rig_home: Path) -> None:
+def test_interrupted_turns_continue(rig_home: Path) -> None:
     procedure, bench = find("hand-turns"), read_bench(HAND)
 
     class Interrupting(Onlooker):
@@ -178,7 +178,9 @@ def test_a_bench_without_the_sensor_is_refused(rig: Rig, rig_home: Path, tmp_pat
         assert f"adc: no input is wired to {missing}; there are ax, ay, az" in ended.err
 
 
-def test_a_gyroscope_without_an_accelerometer_is_led_to_whole_turns(rig: Rig, rig_home: Path, tmp_path: Path) -> None:
+def test_a_gyroscope_without_an_accelerometer_gets_the_advice_of_whole_turns(
+    rig: Rig, rig_home: Path, tmp_path: Path
+) -> None:
     document = yaml.safe_load(HAND.read_text(encoding="utf-8"))
     settings = document["instruments"]["adc"]["settings"]
     inputs = {**settings["channels"], **settings["on_request"]}
@@ -195,7 +197,7 @@ def test_a_gyroscope_without_an_accelerometer_is_led_to_whole_turns(rig: Rig, ri
 
 @pytest.mark.slow
 @pytest.mark.sockets
-def test_a_stopped_run_goes_on_with_its_positions(rig_home: Path) -> None:
+def test_a_stopped_run_continues_with_its_positions(rig_home: Path) -> None:
     procedure, bench = find("hand-positions"), read_bench(HAND)
 
     class Interrupting(Onlooker):
@@ -298,7 +300,7 @@ def test_a_digital_unit_is_calibrated_in_its_own_units(
     assert ended.done().document["results"][found_name]["unit"] == unit
 
 
-def test_a_digital_sensor_records_the_outputs_of_two_sensors_for_who_asks() -> None:
+def test_a_digital_sensor_records_the_outputs_of_two_sensors_on_request() -> None:
     settings = Settings(columns={name: k + 1 for k, name in enumerate(INPUTS)})
     assert list(settings.channels) == ["ax", "ay", "az"]
     assert list(settings.only("adc", INPUTS[:6]).channels) == list(INPUTS[:6])

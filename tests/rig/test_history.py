@@ -69,7 +69,7 @@ def test_the_document_of_a_history_has_its_figures(rig: Rig, years: None) -> Non
     assert (still["allowed"], still["due"]) == (None, None)
 
 
-def test_the_closest_to_a_day_and_whether_it_is_stale(rig: Rig, years: None) -> None:
+def test_the_calibration_closest_to_a_day_is_shown_with_its_staleness(rig: Rig, years: None) -> None:
     fresh = rig("history", "17", "--at", "2022-05-01")
     assert (fresh.status, "Closest to 2022-05-01" in fresh.out, "61 days before" in fresh.out) == (0, True, True)
     near = [rig("history", "17", "--at", f"2022-03-0{day}").out for day in (1, 2)]
@@ -91,7 +91,9 @@ def test_sensors_and_dates_are_compared(rig: Rig, years: None) -> None:
     assert rig("history", "17", "--beside", "18", "--quantity", "bias-y").status == 0
 
 
-def test_of_the_other_sensor_the_last_calibration_alone_is_made(years: None, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_comparison_computes_only_the_last_calibration_of_the_other_sensor(
+    years: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     fitted: list[str] = []
 
     def noted(model: Model, table: Table) -> Fit:
@@ -165,14 +167,14 @@ def test_a_run_of_a_batch_is_a_calibration_of_each_sensor(rig: Rig, bench_file: 
         assert only["rig"] == "the rig in the cellar"
 
 
-def test_a_run_leads_to_the_life_of_its_sensor(rig: Rig, years: None) -> None:
+def test_a_run_names_the_history_of_its_sensor(rig: Rig, years: None) -> None:
     shown = {run["run"]: rig("show", run["run"]).out for run in rig("runs", "--json").document["runs"]}
     said = "The record has 5 calibration runs of the sensor 17: rig history 17"
     assert sum(said in text for text in shown.values()) == 5
     assert sum("rig history 18" in text for text in shown.values()) == 0  # one run makes no life
 
 
-def test_what_is_no_calibration_is_passed_over_and_said(rig: Rig, years: None) -> None:
+def test_a_run_that_is_no_calibration_is_passed_over_with_the_reason(rig: Rig, years: None) -> None:
     with Record() as record:
         columns = {name: values[:2] for name, values in COLUMNS.items()} | {"vx_v": [1.0, 2.0]}
         short = Table.from_columns("poses", columns, {"serial": "17"}, "short")
@@ -236,7 +238,7 @@ def test_calibrations_of_another_kind_or_by_an_incomplete_model_are_not_compared
     assert "not complete for 1 of 3" in life.warnings[0]
 
 
-def test_a_sensor_has_its_type_beside_its_serial_number(years: None) -> None:
+def test_a_sensor_is_shown_with_its_type_and_its_serial_number(years: None) -> None:
     with Record.to_read() as record:
         run = record.runs()[0]
     assert type_of("17", replace(run, constants={"serial": "17", "sensor": "ADXL203"})) == "ADXL203"

@@ -79,7 +79,7 @@ def test_an_undisturbed_run_has_no_interruptions() -> None:
         assert INTERRUPTIONS not in table_of(record, run.run).constants
 
 
-def test_a_part_that_was_killed_is_named_where_the_run_goes_on() -> None:
+def test_a_resume_records_that_the_part_before_was_killed() -> None:
     killed = _turns(lines(("begun", "sweep at pose 0"), ("begun", "sweep at pose 3"), ("complete", "")))
     assert [(turn.what, turn.text) for turn in killed] == [
         ("begun", "sweep at pose 0"),
