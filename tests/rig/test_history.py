@@ -27,6 +27,7 @@ from rig.services.history import (
     type_of,
 )
 from rig.services.history_comparison import compare_rigs
+from rig.services.history_words import next_due
 from tests.rig.conftest import Rig
 from tests.rig.lives import COLUMNS, calibrated
 
@@ -137,6 +138,29 @@ def test_a_later_poor_calibration_does_not_widen_the_limits_of_the_chart() -> No
     assert after is not None
     assert before.sigma == after.sigma == pytest.approx(1e-4)
     assert after.signals == [3, 4]  # a jump, and then the weighted mean is still outside its limit
+
+
+def test_a_limited_quantity_without_a_drift_has_no_due_date() -> None:
+    """bias-y is in two of five calibrations only; the drift of bias-x, which has no limit, says nothing about it."""
+    start, value = datetime(2025, 1, 1, tzinfo=UTC), ParameterValue(2.5, 1e-4, "V")
+    found = tuple(
+        Calibration(
+            f"r{k}",
+            start + timedelta(days=100 * k),
+            "A",
+            {"bias-x": value} | ({"bias-y": value} if k > 2 else {}),
+            None,
+        )
+        for k in range(5)
+    )
+    life = History("17", "linear", found, (), {})
+    assert next_due(judge_history(life, {"bias-y": 0.005}), "") == (
+        "A due date needs 3 calibrations at different times."
+    )
+    assert next_due(judge_history(life, {"bias-x": 0.005, "bias-y": 0.005}), "") == (
+        "A due date of bias-y needs 3 calibrations at different times."
+    )
+    assert next_due(judge_history(life, {"bias-x": 0.005}), "").startswith("With this drift no calibration is due")
 
 
 def _calibration(start: datetime, day: int, value: float, std: float) -> Calibration:
