@@ -25,7 +25,7 @@ AHEAD = 3  # chunks in transit for each thread of a worker
 PATIENCE_S = 10  # for a scheduler to answer
 FEW = 10  # messages that Dask keeps of each connection: they hold the tables that were sent, and memory would grow
 
-NOT_STARTED = "the workers did not start ({}); free memory, or ask for fewer --workers"
+NOT_STARTED = "the workers did not start ({}); free memory, or give a smaller --workers"
 LOST = "the connection to the scheduler is lost; finished work is in the record: run the same command again"
 
 T = TypeVar("T")

@@ -141,7 +141,7 @@ def allan(
 
 
 def ratio(curve: DeviationComparison) -> Panel:
-    """Measured over modelled deviation: where the interval leaves 1, the model fails."""
+    """Measured over modelled deviation: the model fails where the interval does not contain 1."""
     hover = [f"{abs(d):.1f} standard deviations off at {t:.4g} s"
              for d, t in zip(curve.deviations, curve.tau_s, strict=True)]  # fmt: skip
     low, high = curve.low / curve.modelled, curve.high / curve.modelled
