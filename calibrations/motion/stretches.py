@@ -1,7 +1,14 @@
 """A record of motion as rows for a fit: the lines of the motion as templates of the output, and the noise near them.
 
-The white noise of a line is the density of the output beside it, without what follows the motion: a noise model without
-parameters (Pintelon and Schoukens, System Identification: A Frequency Domain Approach, 2012).
+Ten thousand samples behind an output filter are not independent, and most of their band has only noise. So a record
+is cut into some thirty stretches of a whole number of periods. Each stretch is reduced to its mean and to its parts
+in phase and in quadrature with each line of the motion, as in a lock-in amplifier. Each of these parts is a channel,
+and their rows are independent.
+
+    weights . samples = rows            the model's prediction is reduced by the same weights as the measurement
+
+The white noise of a line is the density of the output near it, without the part that follows the motion: a noise model
+without parameters (Pintelon and Schoukens, System Identification: A Frequency Domain Approach, 2012).
 """
 
 from __future__ import annotations
@@ -107,15 +114,6 @@ def _spectrum(
     excluded[-1] = True  # half the sampling rate has another distribution
     return f[~excluded], density[~excluded]
 
-
-# The rows of a record.
-#
-# Ten thousand samples behind an output filter are not independent, and most of their band has only noise. So a record
-# is cut into some thirty stretches of a whole number of periods. Each stretch is reduced to its mean and to its parts
-# in phase and in quadrature with each line of the motion, as in a lock-in amplifier. Each of these parts is a channel,
-# and their rows are independent.
-#
-#     weights . samples = rows            the model's prediction is reduced by the same weights as the measurement
 
 STRETCHES = 30  # of all records together; slow noise wants 20
 EDGE_S = 0.25  # left out at each end of a record: filters settle
