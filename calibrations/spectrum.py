@@ -31,7 +31,7 @@ from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
-import scipy  # its rooms are loaded where they are first entered: a list of effects needs none
+import scipy  # its modules load slowly: they are imported at their first use, and a list of effects needs none
 from numpy.typing import NDArray
 
 from calibrations.table import Array

@@ -27,7 +27,7 @@ FEWEST_POINTS = 4
 
 
 @dataclass(frozen=True)
-class Curve:
+class CalibrationCurve:
     """One calibration of one sensor: points (gap in um, output in V) in order of the gap, for each side.
 
     Raises ValueError for points that are no curve.
@@ -44,7 +44,7 @@ class Curve:
             _require_curve(f"far side of D63 {self.serial}", self.far, rising=False)
 
     @classmethod
-    def from_mapping(cls, values: Mapping[str, Any]) -> Curve:
+    def from_mapping(cls, values: Mapping[str, Any]) -> CalibrationCurve:
         """A curve as a bench file gives it: keys serial, date, near, far. Raises ValueError."""
         if unknown := sorted(map(str, set(values) - set(KEYS))):
             raise ValueError(f"{', '.join(unknown)}: not a key of a D63's curve; the keys are {', '.join(KEYS)}")
@@ -54,7 +54,7 @@ class Curve:
         return cls(str(values["serial"]), str(values["date"]), near, far)
 
     @classmethod
-    def from_file(cls, path: Path) -> Curve:
+    def from_file(cls, path: Path) -> CalibrationCurve:
         """A curve in a YAML file that the user wrote. Raises ValueError with the file's name."""
         try:
             document = yaml.safe_load(path.read_text(encoding="utf-8"))

@@ -1,13 +1,14 @@
 """Positions at rest of a sensor in a hand: the part that all procedures by hand have in common.
 
-The noise at rest is measured first. Then the program says which attitude it needs, sees when the sensor is at rest in a
-new one, takes the position, and ends when the uncertainties are small enough.
+The noise at rest is measured first. Then the program shows which attitude it needs, detects when the sensor is at rest
+in a new one, records the position, and ends when the uncertainties are small enough.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum, auto
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +22,18 @@ WINDOW_S = 0.5  # of a test of rest
 NOISE_WINDOWS = 20  # windows of rest that show the noise
 LONGEST_WAIT_S = 86_400.0
 FEWEST = 12  # positions: nine parameters, and three that check them
-KNOWN = "this position is known already"
 SIDES = 6  # the first positions
-TRIES = 2  # rests at known positions before another orientation is wanted
+TRIES = 2  # rests at known positions before another orientation is requested
 FLAT = (0.0, 0.0, 1.0)
+
+
+class HandStep(Enum):
+    """What the program waits for while a person moves the sensor."""
+
+    MOVING = auto()  # the end of the motion
+    AT_REST = auto()  # enough samples at rest
+    KNOWN = auto()  # another position: the present one is measured already
+
 
 Course = Callable[[Sequence[Dwell], NoiseAtRest, Sequence[str]], HandCourse]
 
@@ -67,8 +76,8 @@ class Goal:
         worst, parameter = course.uncertainty
         if not parameter:
             return ""
-        known, wanted = f"{self.shown * worst:.2g} {self.unit}", f"{self.shown * self.target:g} {self.unit}"
-        return "; ".join(filter(None, (f"{parameter} is known to {known}, wanted {wanted}", course.doubt)))
+        reached, target = f"{self.shown * worst:.2g} {self.unit}", f"{self.shown * self.target:g} {self.unit}"
+        return "; ".join(filter(None, (f"{parameter}: standard uncertainty {reached}, target {target}", course.doubt)))
 
 
 def outputs_of(samples: Samples, names: Sequence[str]) -> NDArray[np.float64]:
@@ -137,8 +146,8 @@ def _find_next_rest(
 ) -> Samples | None:
     """The next rest at a new position. The first window of a rest is left out: the hand has just let go.
 
-    None after TRIES rests at known positions: an earlier position was not the one that the person was told, and is the
-    wanted one. Raises NoAnswer after `wait_s` without one.
+    None after TRIES rests at known positions: an earlier position was not the requested one, but is the one that is
+    requested now. Raises NoAnswer after `wait_s` without one.
     """
     windows: list[Samples] = []
     doing, refusals = PresentStep(rig), 0
@@ -147,32 +156,34 @@ def _find_next_rest(
         stillness = analysis.judge([w.volts for w in windows], noise)
         if not stillness.still:
             doing.say(
-                f"{course.words}: the sensor moves ({stillness.noise:.2g} times the noise at rest, by {stillness.by})"
+                HandStep.MOVING,
+                f"{course.words}: the sensor moves ({stillness.noise:.2g} times the noise at rest, by {stillness.by})",
             )
             windows = windows[1:] if stillness.by == "creep" else []
             if refusals >= TRIES:
                 return None
         elif len(windows) * WINDOW_S <= goal.rest_s:
-            doing.say(f"{course.words}: at rest, wait")
+            doing.say(HandStep.AT_REST, f"{course.words}: at rest, wait")
         elif course.is_new((candidate := join_samples(windows[1:])).volts.mean(axis=0)):
             return candidate
         else:
-            refusals += not doing.text.startswith(KNOWN)
-            doing.say(f"{KNOWN}; needed: {course.words}")
+            refusals += doing.step is not HandStep.KNOWN
+            doing.say(HandStep.KNOWN, f"this position is measured already; next: {course.words}")
             windows = windows[1:]
     raise NoAnswer(
-        f"no new position for {goal.wait_s:g} s; needed: {course.words}; {doing.text}; resume the run to go on"
+        f"no new position for {goal.wait_s:g} s; next: {course.words}; {doing.text}; resume the run to continue"
     )
 
 
 @dataclass
 class PresentStep:
-    """The present step, reported once."""
+    """The present step and its last text; the first text of each step is shown."""
 
     rig: Session
+    step: HandStep | None = None
     text: str = ""
 
-    def say(self, text: str) -> None:
-        if text.partition("(")[0] != self.text.partition("(")[0]:
+    def say(self, step: HandStep, text: str) -> None:
+        if step is not self.step:
             self.rig.host.doing(text)
-        self.text = text
+        self.step, self.text = step, text

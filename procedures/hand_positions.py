@@ -1,10 +1,10 @@
 """hand-positions: a person turns an accelerometer from rest to rest; no stage.
 
-Excites   bias, scale factor and nonorthogonality of three axes; nonlinearity, from more positions than these need.
-Blind to  misalignment to the case, because the orientations are not known; hysteresis; warm-up, in so short a time.
+Excites   bias, scale factor and nonorthogonality of three axes; nonlinearity, with additional positions.
+Blind to  misalignment to the case, because the orientations are not known; hysteresis; warm-up, as the run is short.
 Source    Tedaldi, Pretto and Menegatti, ICRA 2014; Skog et al. (2010), detectors of zero velocity.
 
-The program sees when the sensor is at rest, takes the position, and says which orientation it needs next.
+The program detects when the sensor is at rest, records the position, and shows which orientation it needs next.
 """
 
 from __future__ import annotations

@@ -20,6 +20,7 @@ from procedures.at_rest import (
     FEWEST,
     WINDOW_S,
     Goal,
+    HandStep,
     PresentStep,
     guidance,
     learn_noise,
@@ -109,15 +110,16 @@ class Watch:
         doing = PresentStep(self.rig)
         for _ in range(round(self.goal.wait_s / WINDOW_S)):
             if (motion := self._take(next(self.stream))) is not None:
-                doing.say(f"{course.words}: the sensor moves ({motion})")
+                doing.say(HandStep.MOVING, f"{course.words}: the sensor moves ({motion})")
             elif len(self.rest) <= self._count:
-                doing.say(f"{course.words}: at rest, wait")
+                doing.say(HandStep.AT_REST, f"{course.words}: at rest, wait")
             elif course.is_new(outputs_of(join_samples(self.rest[1:]), FORCES).mean(axis=0)):
                 return
             else:
-                doing.say(f"the sensor lies as before; needed: {course.words}")
+                doing.say(HandStep.KNOWN, f"the sensor has the same orientation as before; next: {course.words}")
         raise NoAnswer(
-            f"no new position for {self.goal.wait_s:g} s; needed: {course.words}; {doing.text}; resume the run to go on"
+            f"no new position for {self.goal.wait_s:g} s; next: {course.words}; {doing.text}; "
+            "resume the run to continue"
         )
 
     def keep(self, words: str) -> None:

@@ -38,7 +38,8 @@ class Question:
     def _bad_answer(self, answer: str, hint: str = "") -> BadAnswer:
         remedy = f"answer with {self.accepts}{hint}"
         return BadAnswer(
-            f"{self.name}: {answer!r} does not answer {self.text!r}; {remedy}", f"{answer!r} is no answer; {remedy}"
+            f"{self.name}: {answer!r} does not answer {self.text!r}; {remedy}",
+            f"{answer!r} is not a valid answer; {remedy}",
         )
 
 

@@ -33,7 +33,7 @@ def temperature_cycle(
     oven is switched off at the end, and when a run fails.
 
     temperatures_c  The temperatures of the oven.
-    cycles          The number of cycles. Two or more show whether the sensor comes back to where it was.
+    cycles          The number of cycles. Two or more separate hysteresis from drift.
     soak_s          How long the sensor stays at a temperature before its tumble.
     """
     steps = staircase(temperatures_c, cycles)

@@ -48,7 +48,7 @@ def write_whole(path: Path, content: str | bytes) -> None:
 
 @contextmanager
 def draft_of(path: Path) -> Iterator[Path]:
-    """A file in the same folder to write to; it takes the place of `path` at the end of the block.
+    """A file in the same folder to write to; it replaces `path` at the end of the block.
 
     A process that is killed leaves `path` as it was. Raises OutputError for a device, and for a file that cannot be
     written.

@@ -18,7 +18,7 @@ NO_URL = (
 )
 
 
-def lab_url(text_url: str, source: str = "what was given") -> URL:
+def lab_url(text_url: str, source: str = "this") -> URL:
     """The parsed URL. Raises RecordError, which begins with `source` and does not quote the URL."""
     try:
         url = make_url(text_url)

@@ -11,7 +11,7 @@ from calibrations.model.file import read_model
 from calibrations.noise.analysis import analyse
 from calibrations.noise.record import Samples, reduce_record
 from calibrations.table import Table
-from drivers.labjack_t7.stream import Calibration
+from drivers.labjack_t7.stream import RangeCalibration
 from drivers.labjack_t7.twin import codes_of_volts
 from drivers.world.config import WorldConfig
 from drivers.world.world import World
@@ -23,7 +23,7 @@ def main() -> None:
     beta = np.tile(np.arange(0.0, 360.0, 30.0), 3)
     columns = world.dwell_mean(np.repeat([90.0, 30.0, 150.0], 12), beta, direction=np.ones(36, dtype=int))
     volts = world.adc_volts(["vx", "vy", "supply"], world.now_s, 1e-3, 100)
-    codes_of_volts(volts, [Calibration(3.2e-4, -3.2e-4, 33523.0, -10.6)] * 3)
+    codes_of_volts(volts, [RangeCalibration(3.2e-4, -3.2e-4, 33523.0, -10.6)] * 3)
     still = [np.random.default_rng(1).standard_normal(1000)]
     analyse(reduce_record([Samples("x", still, 1000.0, "V")], "warm", every_deviation=True))
     table = Table.from_columns("poses", columns, {}, "warm")

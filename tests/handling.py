@@ -43,7 +43,7 @@ ENOUGH = 12  # intervals for imu_tk
 
 
 @dataclass(frozen=True)
-class Calibration:
+class LinearCalibration:
     """Zeros b (3,) and matrix M (3, 3) of outputs v = b + M a, with the positions and the time that they took."""
 
     b: Array
@@ -62,7 +62,7 @@ class Calibration:
         rows = self.M / self.gains[:, None]
         return np.asarray([np.arcsin(rows[i] @ rows[j]) / DEG for i, j in ((0, 1), (0, 2), (1, 2))])
 
-    def errors(self, true: Calibration) -> dict[str, Array]:
+    def errors(self, true: LinearCalibration) -> dict[str, Array]:
         """Errors of zeros in mg, gains in per mille, angles in deg, each (3,)."""
         return {
             "bias_mg": 1e3 * (self.b - true.b) / true.gains,
@@ -96,7 +96,7 @@ def world_of(seed: int, hand: Hand | None = None) -> HandheldWorld:
     return HandheldWorld(WorldConfig.ideal(), seed, Handheld(hand=hand or Hand()))
 
 
-def truth(world: HandheldWorld) -> Calibration:
+def truth(world: HandheldWorld) -> LinearCalibration:
     """The calibration of a perfect laboratory."""
     masses = world.triad.x, world.triad.y, world.triad.z
     rows = [
@@ -104,20 +104,22 @@ def truth(world: HandheldWorld) -> Calibration:
         * (np.cos(mass.leans_deg * DEG) * np.eye(3)[k] + np.sin(mass.leans_deg * DEG) * np.eye(3)[k - 2])
         for k, mass in enumerate(masses)
     ]
-    return Calibration(np.array([mass.zero_v for mass in masses]), np.array(rows), 0, 0.0)
+    return LinearCalibration(np.array([mass.zero_v for mass in masses]), np.array(rows), 0, 0.0)
 
 
-def by_procedure(seed: int, hand: Hand | None = None, target_g: float = 0.001) -> Calibration:
+def by_procedure(seed: int, hand: Hand | None = None, target_g: float = 0.001) -> LinearCalibration:
     """hand-positions, with the estimate of all programs here."""
     world = world_of(seed, hand)
     rig, book = hand_session(world)
     hand_positions(rig, target_g=target_g)
     means = np.array([[dwell.means[name] for name in FORCES] for dwell in book.dwells])
     b, M, _ = magnitude_fit(means)
-    return Calibration(b, M, len(means), world.now_s)
+    return LinearCalibration(b, M, len(means), world.now_s)
 
 
-def by_imu_tk(seed: int, hand: Hand | None = None, positions: int = 16, every_s: float = 8.0) -> Calibration | None:
+def by_imu_tk(
+    seed: int, hand: Hand | None = None, positions: int = 16, every_s: float = 8.0
+) -> LinearCalibration | None:
     """The prescription of imu_tk; None if no multiple leaves 12 intervals ("not enough intervals").
 
     The person gives each of `positions` `every_s`, as nothing tells whether it was taken.
@@ -140,10 +142,10 @@ def by_imu_tk(seed: int, hand: Hand | None = None, positions: int = 16, every_s:
     if not found:
         return None
     b, M, _, count = min(found, key=lambda each: each[2])
-    return Calibration(b, M, count, world.now_s)
+    return LinearCalibration(b, M, count, world.now_s)
 
 
-def by_imucal(seed: int, hand: Hand | None = None, rest_s: float = 3.0) -> Calibration:
+def by_imucal(seed: int, hand: Hand | None = None, rest_s: float = 3.0) -> LinearCalibration:
     """The prescription of imucal: six sides; a person marks the rests afterwards, here without an error.
 
     No side is a wrong one: with six sides a person notices it, and the method would not survive it.
@@ -157,10 +159,10 @@ def by_imucal(seed: int, hand: Hand | None = None, rest_s: float = 3.0) -> Calib
             _samples(world, 0.5)  # the person marks no stretch in which the hand holds the sensor
         means.append(_samples(world, rest_s).mean(axis=0))
     faces = np.array(means).reshape(3, 2, 3)
-    return Calibration(np.diag(faces.mean(axis=1)).copy(), (faces[:, 0] - faces[:, 1]).T / 2, 6, world.now_s)
+    return LinearCalibration(np.diag(faces.mean(axis=1)).copy(), (faces[:, 0] - faces[:, 1]).T / 2, 6, world.now_s)
 
 
-def on_stage(seed: int, dwell_s: float = 5.0) -> Calibration:
+def on_stage(seed: int, dwell_s: float = 5.0) -> LinearCalibration:
     """26 exact orientations, `dwell_s` each, with a move of 4 s between them."""
     world = world_of(seed)
     rng = np.random.default_rng([seed, 98])
@@ -171,7 +173,7 @@ def on_stage(seed: int, dwell_s: float = 5.0) -> Calibration:
         means.append(steady_v(world.triad, up[None])[0] + noise.mean(axis=0))
     columns = np.column_stack([np.ones(len(ORIENTATIONS)), ORIENTATIONS])
     solved = np.linalg.lstsq(columns, np.array(means), rcond=None)[0]
-    return Calibration(solved[0], solved[1:].T, len(ORIENTATIONS), (dwell_s + 4.0) * len(ORIENTATIONS))
+    return LinearCalibration(solved[0], solved[1:].T, len(ORIENTATIONS), (dwell_s + 4.0) * len(ORIENTATIONS))
 
 
 def magnitude_fit(means: Array) -> tuple[Array, Array, float]:
@@ -293,13 +295,15 @@ def turn_world(seed: int, hand: Hand | None = None) -> HandheldWorld:
     return HandheldWorld(config, seed, Handheld(hand=hand or Hand()))
 
 
-def true_gyroscope(world: HandheldWorld) -> Calibration:
+def true_gyroscope(world: HandheldWorld) -> LinearCalibration:
     """Zeros and matrix of the gyroscope in the frame of its accelerometer: x kept, y in the plane of x and y."""
     sensor = world.config.gyroscope
     rates, volts = 50.0 * np.vstack([np.eye(3), -np.eye(3)]), np.empty((6, 3))
     turned_sensors.gyroscope_volts(record(sensor), turned_sensors.die(sensor), rates, np.zeros((6, 3)), 0.0, volts)
     frame, upper = np.linalg.qr(truth(world).M.T)
-    return Calibration(volts.mean(axis=0), (volts[:3] - volts[3:]).T / 100 @ (frame * np.sign(np.diag(upper))), 0, 0.0)
+    return LinearCalibration(
+        volts.mean(axis=0), (volts[:3] - volts[3:]).T / 100 @ (frame * np.sign(np.diag(upper))), 0, 0.0
+    )
 
 
 @dataclass(frozen=True)

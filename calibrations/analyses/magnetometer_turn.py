@@ -1,6 +1,6 @@
-"""Hard and soft iron from the extremes of full turns (the Book), and the elements of the earth's field.
+"""Full turns of a magnetometer, each with one axis vertical: hard and soft iron, and the elements of the earth's field.
 
-The results are compared with those of an ellipsoid fit.
+Hard and soft iron follow from the extremes of the turns (the Book). They are compared with those of an ellipsoid fit.
 
     h = (max + min) / 2                                    of each axis: hard iron
     r = sqrt(x1^2 + y1^2), theta = atan2(y1, x1)           (17.11), (17.12): the point farthest from the middle
@@ -14,8 +14,15 @@ is e / sqrt(2) times a t of two degrees of freedom. The standard uncertainties a
 interval, `HIDDEN_IRON` e, of Z and of the horizontal field. The first effect cancels in the mean of a turn and a turn
 with the sensor turned over.
 
-Source  Book 17.5; JCGM 100, 4.3.7 (rectangular), G.3 (t); Konvalin, Compensating for tilt, hard-iron and soft-iron
-        effects (2009).
+The calibrated outputs, turned back by the angles of the stages and the mount, are the field in the frame of the rig:
+x along its base, z upward. Its elements have north = x, east = -y and down = -z. So D is not the declination, but the
+azimuth from the x axis of the base, clockwise from above; the bench file has the heading of that axis.
+
+The outputs of one turn have a common error, from the seat of the sensor in its mount. The uncertainties are therefore
+from the scatter between turns.
+
+Source  Book 17.4-17.5, (17.6)-(17.15); JCGM 100, 4.3.7 (rectangular), G.3 (t); Konvalin, Compensating for tilt,
+        hard-iron and soft-iron effects (2009).
 """
 
 from __future__ import annotations
@@ -93,19 +100,6 @@ def correct_by_extremes(outputs: Array) -> Array:
     centred = outputs - estimate_hard_iron(outputs)
     ellipse = fit_ellipse(centred[:, :2])
     return np.column_stack([centred[:, :2] @ ellipse.correction, centred[:, 2:]])
-
-
-# Full turns of a magnetometer, each with one axis vertical: the evaluation by hand, and the elements of the field.
-#
-# The calibrated outputs, turned back by the angles of the stages and the mount, are the field in the frame of the rig:
-# x along its base, z upward. Its elements have north = x, east = -y and down = -z. D is then not the
-# declination, but the azimuth from the x axis of the base, clockwise from above; the bench file has the heading of
-# that axis.
-#
-# The outputs of one turn have a common error, from the seat of the sensor in its mount. The uncertainties are therefore
-# from the scatter between turns.
-#
-# Source  Book 17.4-17.5, (17.6)-(17.15).
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,13 @@ round approaches its poses from both sides; s: drift. The squares add up to 1, s
 round all columns except those of the supply are orthogonal to g. An effect that is linear in a load cannot be separated
 from a rotation of the axis, whatever its cause, and is a part of the result.
 
+The angles of a search for the extreme output give the directions, and these correct the acceleration:
+
+    Theta_x = Ry(alpha_x) Rz(beta_x) [1 0 0]^T        Theta_y = Rx(alpha_y) Rz(beta_y) [0 1 0]^T
+
+Two misprints of Ang (18)-(21) are corrected: x_ref is [1 0 0], not [0 0 1], and (20) subtracts theta_xy A_y, not
+theta_yx A_y. The printed angles for y do not give the printed Theta_y.
+
 Source  Ang (18)-(21); generalised least squares; noise as in `noise_fit`.
 """
 
@@ -25,13 +32,6 @@ from calibrations.fitting.noise_fit import estimate
 from calibrations.geometry.orientation import rotation
 from calibrations.means.noise import Noise, white_only, white_std
 from calibrations.table import AXES, Array, Table
-
-# The directions of the sensing axes from a search for the extreme output, and the correction by them.
-#
-#     Theta_x = Ry(alpha_x) Rz(beta_x) [1 0 0]^T        Theta_y = Rx(alpha_y) Rz(beta_y) [0 1 0]^T
-#
-# Ang (18)-(21), with two misprints corrected: x_ref is [1 0 0], not [0 0 1], and (20) subtracts theta_xy A_y, not
-# theta_yx A_y. The printed angles for y do not give the printed Theta_y.
 
 
 def search_angles_x(alpha_deg: float, beta_deg: float) -> tuple[float, float]:

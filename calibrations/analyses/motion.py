@@ -2,7 +2,18 @@
 
 Output filter and sampling skew are removed from the sensor's output, which is then low-passed to the paper's band (a
 second-order Butterworth at 20 Hz, corrected for its delay and attenuation at the motion's frequency). Each model
-converts it to acceleration. The reference passes the same low-pass, so that both have the same band.
+converts it to acceleration: the inverse of the output filter, then the inverse of the model. The inverse of a low-pass
+increases the noise with frequency; the band limits this. The reference passes the same low-pass, so that both have the
+same band.
+
+Both models are fitted to a sweep of the same sensor:
+
+linear     the manufacturer's, Ang (1)-(3): bias and scale factor of each axis from +1 g and -1 g
+physical   the shipped physical model, fitted jointly. It has hysteresis if the sweep has both directions, because
+           its loop would otherwise change the squares and products. A motion is between the branches of the
+           hysteresis, where its contribution is 0.
+
+Source  Ang I, (1)-(3); V, Fig. 12.
 """
 
 from __future__ import annotations
@@ -46,10 +57,6 @@ from calibrations.motion.spectrum import (
 )
 from calibrations.table import Array, Table, std_column
 from calibrations.tables import KINDS
-
-# Acceleration from the sensor's output: inverse of the output filter, then inverse of the model.
-#
-# The inverse of a low-pass increases the noise with frequency; the band after it limits this.
 
 
 def acceleration(table: Table, model: Model) -> Array:
@@ -236,14 +243,6 @@ def _motion_part(x: Array, record: Record, reference: Reference) -> Array:
     columns += [wave(2 * np.pi * line.frequency_hz * t) for line in reference.lines for wave in (np.cos, np.sin)]
     scaled = np.column_stack(columns) / np.linalg.norm(columns, axis=1)
     return np.asarray(scaled @ np.linalg.lstsq(scaled, x, rcond=1e-9)[0])
-
-
-# The two models that the paper judges by motion, fitted to a sweep of the same sensor.
-#
-# linear     the manufacturer's, Ang (1)-(3): bias and scale factor of each axis from +1 g and -1 g
-# physical   the shipped physical model, fitted jointly. It has hysteresis if the sweep has both directions, because
-#            its loop would otherwise change the squares and products. A motion is between the branches of the
-#            hysteresis, where its contribution is 0.
 
 
 def linear_from_turns(sweep: Table) -> Model:

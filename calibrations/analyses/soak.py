@@ -1,10 +1,16 @@
 """A soak: bias and scale factor of each axis in the hours after power-on, and the record at rest between reversals.
 
-Its table has a row for each pose of a tumble (path `reversal k`) and for each block of the still record (`hold k`).
-A gap is time of which nothing was kept: any within a hold, and more than moves take elsewhere. A tumble that a gap
-interrupts is left out, as drift no longer cancels in it.
+The table has a row for each pose of a tumble (path `reversal k`) and for each block of the still record (`hold k`).
+A gap is a time without data: any within a hold, and elsewhere a time longer than a move. A tumble with a gap is left
+out, because drift no longer cancels in it.
 
-Source  Ang III.B, Fig. 10.
+The approach of a quantity to its steady state is a sum of exponentials. The steady-state time is the first time after
+which the remaining drift stays within the expanded uncertainty (k = 2) of one measured value, slow noise included.
+After it no measurement separates the remaining drift from noise. It is not reached if it is after the end of the
+record, or if the time constant of the noise is as long as the record.
+
+Source  Ang III.B, Fig. 10: about 7 h, 2 to 12 h over eight axes; JCGM 100, 5.1: propagation, 6.2: expanded
+        uncertainty.
 """
 
 from __future__ import annotations
@@ -36,15 +42,9 @@ from calibrations.means.noise import rms
 from calibrations.noise.deviations import deviations
 from calibrations.table import Array, Table, std_column
 
-# Steady state after switching on: its time, the drift until then, and its time constants.
-#
-# The steady-state time is the first after which the remaining drift stays within the expanded uncertainty (k = 2) of
-# one measured value, slow noise included: after it no measurement separates the remaining drift from noise. It is not
-# reached if it is after the end of the record, or if the time constant of the noise is as long as the record.
-#
-# Source  Ang III.B, Fig. 10: about 7 h, 2 to 12 h over eight axes; JCGM 100, 5.1: propagation, 6.2: expanded
-# uncertainty.
-
+REVERSAL, HOLD = "reversal", "hold"  # first words of the paths
+AXES = "xy"
+HOUR_S = 3600.0
 TIME_POINTS = 4000  # of time among which the steady state is looked for
 RELATIVE_STEP = 1e-4  # of a parameter, for a slope
 
@@ -196,11 +196,6 @@ def fit_steady_state(t_s: Array, values: Array, stds: Array) -> SteadyState:
         (float(t_s[0]), float(t_s[-1])),
         len(t_s) - len(parameters),
     )
-
-
-REVERSAL, HOLD = "reversal", "hold"
-AXES = "xy"
-HOUR_S = 3600.0
 
 
 @dataclass(frozen=True)

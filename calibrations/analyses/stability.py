@@ -1,8 +1,28 @@
 """Stability of a quantity: agreement of two calibrations, repeatability, drift over calibrations, trend of one pose.
 
-    E_n = (a - b) / sqrt(U_a^2 + U_b^2)        two values agree if |E_n| <= 1
+Agreement: two values with expanded uncertainties U agree if |E_n| <= 1.
 
-Source  ISO/IEC 17043:2023 and ISO 13528:2022, 9.7 (E_n).
+    E_n = (a - b) / sqrt(U_a^2 + U_b^2)
+
+Repeatability: the change of a quantity between repetitions beyond the noise of each.
+
+    s_b^2 = s^2 - u^2      s^2: variance of n repetitions, u^2: mean square of their own standard errors
+
+s^2 of n repetitions has n - 1 degrees of freedom: its relative standard deviation is sqrt(2 / (n - 1)). This applies to
+the sum of both variances, which is at least u^2: repetitions that agree by chance do not lower it.
+
+Drift: the line through a sensor's calibrations, their scatter about it, and the next due date.
+
+    y_i = a + b (t_i - t0) + e_i        var e_i = u_i^2 + s^2
+
+u_i is the standard uncertainty of a calibration. s is the further scatter between calibrations: the weighted sum of
+squares then equals its n - 2 degrees of freedom. A prediction lies on the line, with the uncertainty of the line and s.
+A calibration is due when the 95 % interval (Student, n - 2) first exceeds a limit.
+
+Trend: a straight line through repeated measurements of a reference pose.
+
+Source  ISO/IEC 17043:2023 and ISO 13528:2022, 9.7 (E_n); ISO 5725-2, variance between; JCGM 100, 4.2, H.3 (a line);
+        Mandel and Paule, Anal. Chem. 42 (1970); ILAC-G24 / OIML D 10 (intervals by drift).
 """
 
 from __future__ import annotations
@@ -17,6 +37,8 @@ from calibrations.criteria import COVERAGE, COVERAGE_FACTOR, FEWEST_FOR_DRIFT, H
 from calibrations.errors import DataError, TooFewRows
 from calibrations.estimators.least_squares import between_variance, least_squares
 from calibrations.table import Array
+
+YEAR_DAYS = 365.25
 
 
 @dataclass(frozen=True)
@@ -42,16 +64,6 @@ def compare_values(a: tuple[float, float], b: tuple[float, float]) -> Agreement:
     return Agreement(a[0], b[0], a[0] - b[0], COVERAGE_FACTOR * (a[1] ** 2 + b[1] ** 2) ** 0.5)
 
 
-# Repeatability: the change of a quantity between repetitions beyond the noise of each.
-#
-#     s_b^2 = s^2 - u^2      s^2: variance of n repetitions, u^2: mean square of their own standard errors
-#
-# s^2 of n repetitions has n - 1 degrees of freedom: its relative standard deviation is sqrt(2 / (n - 1)). It is that of
-# the variance that s_b and u make together, which is u^2 at least: repetitions that agree by chance do not lower it.
-#
-# Source  ISO 5725-2, variance between; JCGM 100, 4.2.
-
-
 def repeatability(values: Sequence[float], stds: Sequence[float]) -> tuple[float, float | None]:
     """(s_b, its standard error) of `values` with own standard errors `stds`; 0 where noise explains the scatter.
 
@@ -68,19 +80,6 @@ def repeatability(values: Sequence[float], stds: Sequence[float]) -> tuple[float
     spread = max(variance, noise) * np.sqrt(2 / (n - 1))
     std = float(np.sqrt(between_variance + spread) - np.sqrt(between_variance))
     return float(np.sqrt(between_variance)), std if std > 0 else None
-
-
-# A quantity over a sensor's calibrations: its drift, its scatter between calibrations, and the next due date.
-#
-#     y_i = a + b (t_i - t0) + e_i        var e_i = u_i^2 + s^2
-#
-# u_i is the standard uncertainty of a calibration; s is the further scatter between calibrations, such that the
-# weighted square sum equals its n - 2 degrees of freedom (Mandel and Paule). A prediction lies on the line, with the
-# uncertainty of the line and s. A calibration is due when the 95 % interval (Student, n - 2) first exceeds a limit.
-#
-# Source  Mandel and Paule, Anal. Chem. 42 (1970); ILAC-G24 / OIML D 10 (intervals by drift); JCGM 100, H.3 (a line).
-
-YEAR_DAYS = 365.25
 
 
 @dataclass(frozen=True)
@@ -146,9 +145,6 @@ def fit_stability(t_days: Sequence[float], values: Sequence[float], stds: Sequen
 def _line(t: Array) -> Array:
     """Columns of a straight line over times (n,): value at 0 and slope."""
     return np.column_stack([np.ones_like(t), t])
-
-
-# A straight line through repeated measurements: the drift of a reference pose.
 
 
 def fit_trend(times: Array, values: Array) -> tuple[float, float]:

@@ -1,7 +1,20 @@
 """The paper's own estimation, Ang (1)-(17), step by step and axis by axis, to compare with the joint `fit`.
 
-Its terms overlap. A tilt of the sensing axis is linear in the other two components of gravity, and so ends up in p1
-and q1; the correction (20) by the angles of a search then takes it off a second time. `Tilt` says how much that is.
+The coefficients of one sensing axis are estimated one after another, each from its own part of the data:
+
+    B, SF       output along and against gravity at alpha = 90 deg                      (1)-(2)
+    g(V_p)      quadratic in the other axis's output: residual of the line (8)          (9)-(11)
+    h(V_z)      quadratic in a_z: bias at an inclination less that at 90 deg            (12)-(13)
+    SF(V_z)     quadratic in a_z: scale factor at an inclination                        (15), (17)
+
+V_z is in units of V_g^z, the z output to 1 g, as the sensor has no z channel: during the calibration it is cos(alpha).
+
+The poses are an axis up and an axis down at each inclination, and the turn at 90 deg. They are identified by the
+specific force at their angles, not by the angles: this includes alpha and -alpha, a turned mount, and a sensor face
+down.
+
+The terms overlap. A tilt of the sensing axis is linear in the other two components of gravity, so it is a part of p1
+and q1. The correction (20) by the angles of a search subtracts it a second time. `Tilt` has the size of this.
 """
 
 from __future__ import annotations
@@ -18,11 +31,6 @@ from calibrations.geometry.orientation import reported_force
 from calibrations.importing.foreign import require_kind
 from calibrations.means.noise import rms
 from calibrations.table import Array, Table
-
-# The poses of Ang's equations: an axis up and an axis down at each inclination, and the turn at 90 deg.
-#
-# Poses are identified by the specific force at their angles, not by the angles: this includes alpha and -alpha, a
-# turned mount, and a sensor face down.
 
 DECIMALS = 1  # of an inclination in deg: the digital level's resolution
 UP_AND_DOWN_DEG = ((0, 180), (90, 270))  # beta where x, y are held up and down, at alpha = 90
@@ -93,16 +101,6 @@ def _inclinations(a: Array) -> Array:
     """Angle between the sensor's z axis and the vertical, deg, 0 to 180, shape (n,)."""
     angle: Array = np.degrees(np.arccos(np.clip(a[:, 2], -1.0, 1.0)))
     return np.asarray(np.round(angle, DECIMALS))
-
-
-# One sensing axis by Ang's equations: coefficients found one after another, each from its own part of the data.
-#
-#     B, SF       output along and against gravity at alpha = 90 deg                      (1)-(2)
-#     g(V_p)      quadratic in the other axis's output: residual of the line (8)    (9)-(11)
-#     h(V_z)      quadratic in a_z: bias at an inclination less that at 90 deg            (12)-(13)
-#     SF(V_z)     quadratic in a_z: scale factor at an inclination                        (15), (17)
-#
-# V_z is in units of V_g^z, the z output to 1 g, as the sensor has no z channel: while calibrating it is cos(alpha).
 
 
 @dataclass(frozen=True)

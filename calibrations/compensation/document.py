@@ -23,7 +23,7 @@ from calibrations.compensation.cost import ErrorSize
 from calibrations.compensation.forward import FORCES, INVERTED, LEFT_OUT, NOISE, OF_THE_RIG
 from calibrations.compensation.graph import evaluate_nodes
 from calibrations.compensation.inverse import Compensation
-from calibrations.compensation.program import Line
+from calibrations.compensation.program import ProgramLine
 from calibrations.documents import parameters_document
 from calibrations.effects.logged import RATE
 from calibrations.model import Estimate
@@ -389,5 +389,5 @@ def _size(size: ErrorSize | None) -> dict[str, float] | None:
     return None if size is None else {"rms": size.rms, "most": size.most}
 
 
-def _line(line: Line) -> list[Any]:
+def _line(line: ProgramLine) -> list[Any]:
     return [line.name, line.operation, list(line.inner)]

@@ -20,7 +20,7 @@ from calibrations.table import Array
 
 
 @dataclass(frozen=True)
-class Line:
+class ProgramLine:
     """`name` = operation of `inner`: names of earlier lines, inputs or tables, or numbers."""
 
     name: str
@@ -37,11 +37,11 @@ class Program:
 
     inputs: tuple[str, ...]
     unknowns: tuple[str, ...]
-    before: tuple[Line, ...]
-    loop: tuple[Line, ...]
+    before: tuple[ProgramLine, ...]
+    loop: tuple[ProgramLine, ...]
     next: tuple[str | float, ...]
     steps: int
-    after: tuple[Line, ...] = ()
+    after: tuple[ProgramLine, ...] = ()
     remembered: Mapping[str, str | float] = field(default_factory=dict)
     tables: Mapping[str, Table] = field(default_factory=dict)
 
@@ -105,14 +105,14 @@ class _Names:
         self._lines = 0
         self.tables: dict[Table, str] = {}
 
-    def line(self, node: Node) -> Line:
+    def line(self, node: Node) -> ProgramLine:
         """The node as the next line."""
         inner = tuple(self.word(operand) for operand in node.inner)
         if node.table is not None:
             inner = (*inner, self.tables.setdefault(node.table, f"table{len(self.tables)}"))
         self._names[node] = f"t{self._lines}"
         self._lines += 1
-        return Line(self._names[node], node.operation, inner)
+        return ProgramLine(self._names[node], node.operation, inner)
 
     def word(self, node: Node) -> str | float:
         """The node in later lines."""
@@ -144,7 +144,7 @@ def _find_dependent_nodes(nodes: list[Node], unknowns: set[str]) -> set[Node]:
     return dependent
 
 
-def _execute(lines: tuple[Line, ...], values: dict[str, Any]) -> None:
+def _execute(lines: tuple[ProgramLine, ...], values: dict[str, Any]) -> None:
     for line in lines:
         values[line.name] = OPERATIONS[line.operation].apply(*(_value(name, values) for name in line.inner))
 

@@ -15,7 +15,7 @@ from calibrations.compensation.cost import PASSES
 from calibrations.compensation.document import Origin, ReferenceVectors, header_lines, unit_of_input
 from calibrations.compensation.graph import OPERATIONS
 from calibrations.compensation.inverse import Compensation
-from calibrations.compensation.program import Line, Program
+from calibrations.compensation.program import Program, ProgramLine
 
 SUFFIX = {"double": "", "float": "f"}
 
@@ -30,7 +30,7 @@ def c_files(compensation: Compensation, origin: Origin, checks: ReferenceVectors
     def operand(value: float) -> str:
         return f"({literal(value)})" if value < 0 else literal(value)
 
-    def expression(line: Line) -> str:
+    def expression(line: ProgramLine) -> str:
         return OPERATIONS[line.operation].c.format(*map(literal, line.inner), f=suffix)
 
     def comment(line: str) -> str:
@@ -55,7 +55,7 @@ def python_files(compensation: Compensation, origin: Origin, checks: ReferenceVe
     def literal(word: str | float) -> str:
         return word if isinstance(word, str) else repr(word)
 
-    def expression(line: Line) -> str:
+    def expression(line: ProgramLine) -> str:
         return OPERATIONS[line.operation].python.format(*map(literal, line.inner))
 
     templates = _templates(literal, expression, lambda line: f"# {line}".rstrip())
@@ -66,7 +66,7 @@ def python_files(compensation: Compensation, origin: Origin, checks: ReferenceVe
 
 
 def _templates(
-    literal: Callable[[str | float], str], expression: Callable[[Line], str], comment: Callable[[str], str]
+    literal: Callable[[str | float], str], expression: Callable[[ProgramLine], str], comment: Callable[[str], str]
 ) -> Environment:
     """The templates, with how a language writes an operand, a line of the program and a comment."""
     templates = Environment(  # noqa: S701 source code, not HTML

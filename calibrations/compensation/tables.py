@@ -20,7 +20,7 @@ from calibrations.compensation.graph import ONE, ZERO, Node, look_up, number, po
 from calibrations.compensation.trace import NodeArray, NotTraced, RunTime, as_nodes, as_traced
 from calibrations.effects import Values
 from calibrations.effects.logged import sensor_temperature_c
-from calibrations.free_forms.bases import Clips, Line, Products, Ramp, Spline
+from calibrations.free_forms.bases import Clips, Products, Ramp, Spline, StraightLine
 from calibrations.free_forms.effect import FreeForm, coefficients_of
 from calibrations.free_forms.form import CROSS, Form
 from calibrations.table import Array
@@ -110,25 +110,8 @@ def trace_free_form(effect: FreeForm, a: NodeArray, v: NodeArray, table: RunTime
 
 
 def _part(form: Form, u: Array, a: Sequence[Node], v: Node, table: RunTime, k: int) -> Node:
-    """The value of one form at axis k, with its coefficients u."""
-    basis = form.basis(k)
-    if isinstance(basis, Products):
-        products = [prod(map(power, a, powers), start=ONE) for powers in basis.powers]
-        f = _weighted_sum(u, products)
-    else:
-        x = _driver(form, a, v, table, k)
-        if isinstance(basis, Spline):
-            f = look_up(spline_table(basis, u), x) if len(u) else number(0.0)
-        elif isinstance(basis, Line):
-            slope = float(np.sum(u)) / basis.half_width
-            f = number(slope) * x + number(-slope * (basis.low + basis.high) / 2)
-        elif isinstance(basis, Ramp):
-            f = _weighted_sum(u, [ONE, abs(x), x])
-        elif isinstance(basis, Clips):
-            clips = [x.clipped(number(-width), number(width)) for width in basis.widths]
-            f = _weighted_sum([c / width for c, width in zip(u, basis.widths, strict=False)], clips)
-        else:
-            raise NotTraced(f"its basis {basis.kind} cannot be written as code")
+    """The value of one form at axis k, with its coefficients u: its function, times its factor."""
+    f = _function(form, u, a, v, table, k)
     if form.factor == "force":
         return a[k] * f
     if form.factor == "load":
@@ -136,6 +119,25 @@ def _part(form: Form, u: Array, a: Sequence[Node], v: Node, table: RunTime, k: i
     if form.factor:
         raise NotTraced(f"the {form.factor} is not known at run time")
     return f
+
+
+def _function(form: Form, u: Array, a: Sequence[Node], v: Node, table: RunTime, k: int) -> Node:
+    """The sum of the basis functions of axis k, times their coefficients u."""
+    basis = form.basis(k)
+    if isinstance(basis, Products):
+        return _weighted_sum(u, [prod(map(power, a, powers), start=ONE) for powers in basis.powers])
+    x = _driver(form, a, v, table, k)
+    if isinstance(basis, Spline):
+        return look_up(spline_table(basis, u), x) if len(u) else number(0.0)
+    if isinstance(basis, StraightLine):
+        slope = float(np.sum(u)) / basis.half_width
+        return number(slope) * x + number(-slope * (basis.low + basis.high) / 2)
+    if isinstance(basis, Ramp):
+        return _weighted_sum(u, [ONE, abs(x), x])
+    if isinstance(basis, Clips):
+        clips = [x.clipped(number(-width), number(width)) for width in basis.widths]
+        return _weighted_sum([c / width for c, width in zip(u, basis.widths, strict=False)], clips)
+    raise NotTraced(f"its basis {basis.kind} cannot be written as code")
 
 
 def _driver(form: Form, a: Sequence[Node], v: Node, table: RunTime, k: int) -> Node:

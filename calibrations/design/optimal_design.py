@@ -4,8 +4,21 @@
 
 The rows Sigma^(-1/2) J of independent data are stacked: the information of both is the sum.
 
-Source  Fedorov, Theory of Optimal Experiments (1972); Atkinson, Donev and Tobias, Optimum Experimental Designs, with
-        SAS (2007), ch. 9 to 11; Pronzato, Automatica 44 (2008), 303-325, on effects that are not linear.
+The poses with the most information are a D- or I-optimal design, by exchange of one pose after another:
+
+    D   the greatest det M: the smallest volume of the parameters' joint uncertainty
+    I   the least mean variance of the prediction over a range of poses: tr(M^-1 W)
+
+Here M is the information of the chosen poses, and W the mean of J' J over the range. Each pose in turn is replaced by
+the best of all candidates until no exchange improves the design. There are several random starts, because the optimum
+of each is local.
+
+Some of the chosen poses are measured again: the data then give the noise itself (pure error), and a lack of fit can
+be separated from it. Poses far from all others are added as check poses, which no fit uses.
+
+Source  Fedorov, Theory of Optimal Experiments (1972), exchange; Atkinson, Donev and Tobias, Optimum Experimental
+        Designs, with SAS (2007), ch. 9 to 12; Pronzato, Automatica 44 (2008), 303-325, on effects that are not linear;
+        Kennard and Stone, Technometrics 11 (1969), 137-148, poses far from all.
 """
 
 from __future__ import annotations
@@ -67,22 +80,6 @@ def _noise(fit: Fit, problem: Problem) -> Noise:
         noise = replace(noise, scatter=np.hypot(noise.scatter, noise.slow), ratio=0 * noise.ratio)
     return noise_on_rows(noise, problem)
 
-
-# Poses with the most information on a model: D- and I-optimal designs, by exchange of one pose after another.
-#
-#     D   the greatest det M: the smallest volume of the parameters' joint uncertainty
-#     I   the least mean variance of the prediction over a range of poses: tr(M^-1 W)
-#
-# M is the information of the chosen poses, W the mean of J' J over the range. Each pose in turn is replaced by the best
-# of all candidates until no exchange improves the design. There are several random starts, because the optimum of each
-# is local.
-#
-# Some of the chosen poses are measured again: the data then give the noise itself (pure error), and a lack of fit can
-# be separated from it. Poses far from all others are added as check poses, which no fit uses.
-#
-# Source  Fedorov, Theory of Optimal Experiments (1972), exchange; Atkinson, Donev and Tobias, Optimum Experimental
-#         Designs, with SAS (2007), ch. 10 to 12; Kennard and Stone, Technometrics 11 (1969), 137-148, poses far from
-#         all.
 
 Chosen = NDArray[np.intp]  # numbers of candidates; one that is measured twice is there twice
 

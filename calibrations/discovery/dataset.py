@@ -17,7 +17,7 @@ from calibrations.model import Model
 if TYPE_CHECKING:
     from calibrations.discovery.curves import PlaceCurve
     from calibrations.discovery.enough import Enough
-    from calibrations.discovery.summary import Line
+    from calibrations.discovery.summary import SummaryRow
     from calibrations.model.correlations import Correlations
 
 
@@ -189,7 +189,7 @@ class Dataset(ABC, Generic[F]):
         """By step, its share of the variance beyond the noise; [] where a search has no shares."""
         return []
 
-    def summary(self, discovery: Discovery[F]) -> list[Line]:
+    def summary(self, discovery: Discovery[F]) -> list[SummaryRow]:
         """A line for each place that acts, and for each further effect; [] where a search has no places."""
         return []
 

@@ -120,8 +120,8 @@ def outlier_text(numbers: tuple[int, ...], row_word: str = "poses", limit: int |
     """The outlying rows, the first `limit` of them by their numbers."""
     listed = ", ".join(f"#{number}" for number in numbers[:limit])
     unlisted = f" and {len(numbers) - limit} more" if limit is not None and len(numbers) > limit else ""
-    subject = f"{row_word.removesuffix('s')} stands" if len(numbers) == 1 else f"{row_word} stand"
-    return f"{len(numbers)} {subject} out: {listed}{unlisted}"
+    subject = f"{row_word.removesuffix('s')} differs" if len(numbers) == 1 else f"{row_word} differ"
+    return f"{len(numbers)} {subject} from the others: {listed}{unlisted}"
 
 
 def outliers_in_fit(complete: Fit) -> str | None:

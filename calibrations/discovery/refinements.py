@@ -20,7 +20,7 @@ from calibrations.discovery.significance import chance, of_search
 from calibrations.fitting.fit import Fit
 from calibrations.fitting.residual_forms import OF_FORCE, OF_TABLE, ResidualForms, form_columns, forms_at
 from calibrations.free_forms.acting_places import FORM_OF
-from calibrations.free_forms.bases import Basis, Line, Spline, spline
+from calibrations.free_forms.bases import Basis, Spline, StraightLine, spline
 from calibrations.free_forms.form import Factor, Form
 from calibrations.free_forms.place_names import place_of_effect
 from calibrations.free_forms.rivals import MOSTLY
@@ -149,7 +149,7 @@ def _forms(end: Fit, name: str) -> Iterator[tuple[Form, float]]:
     if driver not in ("temperature", "time", "output"):
         yield Form(place, "curve", driver, (FORCES,), factor), FORM_PART
         if place in LINEAR:
-            yield Form(place, "line", driver, (Line(-1.0, 1.0),), factor), 1.0
+            yield Form(place, "line", driver, (StraightLine(-1.0, 1.0),), factor), 1.0
         return
     if driver == "output":
         bases: tuple[Basis, ...] = tuple(spline(v, INTERVALS) for v in table.outputs.T)
@@ -158,5 +158,6 @@ def _forms(end: Fit, name: str) -> Iterator[tuple[Form, float]]:
         bases = (spline(x, INTERVALS),)
     yield Form(place, "curve", driver, bases, factor), FORM_PART
     if driver == "temperature" and "t_s" in table:
+        line = StraightLine(float(x.min()), float(x.max()))
         for lead in (-LEAD_S, LEAD_S):
-            yield Form(place, "lead", driver, (Line(float(x.min()), float(x.max())),), factor, lead_s=lead), LEADS
+            yield Form(place, "lead", driver, (line,), factor, lead_s=lead), LEADS

@@ -17,7 +17,7 @@ from calibrations.discovery.outliers import fit_without, outliers_in_fit
 from calibrations.discovery.places import fails_by_scatter_only, places
 from calibrations.discovery.plausibility import refusal, rejection
 from calibrations.discovery.row_search import ONE_ORIENTATION, RowSearch
-from calibrations.discovery.summary import Line, step_shares, summary_lines
+from calibrations.discovery.summary import SummaryRow, step_shares, summary_lines
 from calibrations.discovery.verdict import Finding
 from calibrations.effects import Effect
 from calibrations.errors import ModelError, nearest
@@ -269,7 +269,7 @@ class Rows(Dataset[Fit]):
         """On unseen data."""
         return step_shares(discovery)
 
-    def summary(self, discovery: Discovery[Fit]) -> list[Line]:
+    def summary(self, discovery: Discovery[Fit]) -> list[SummaryRow]:
         """Largest first."""
         return summary_lines(discovery)
 

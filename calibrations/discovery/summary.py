@@ -26,7 +26,7 @@ NO_VARIANCE = 0.1  # of the noise's: with less excess variance there are no shar
 
 
 @dataclass(frozen=True)
-class Line:
+class SummaryRow:
     """One cause. `size`: rms in thousandths of the sensed unit; `certainty`: 1 minus the chance of it by noise alone.
 
     The certainty is that of the effect or of the added effects that the data cannot separate from it.
@@ -67,7 +67,7 @@ def step_shares(discovery: Discovery[Fit]) -> list[float | None]:
     return [(excess_variance(s.held_out_before) - excess_variance(s.held_out_after)) / total for s in discovery.steps]
 
 
-def summary_lines(discovery: Discovery[Fit]) -> list[Line]:
+def summary_lines(discovery: Discovery[Fit]) -> list[SummaryRow]:
     """The lines, largest first."""
     if not discovery.steps:
         return []  # an output that does not respond has no scale
@@ -77,12 +77,12 @@ def summary_lines(discovery: Discovery[Fit]) -> list[Line]:
     return sorted((replace(line, share=line.size**2 / total) for line in lines), key=lambda line: -line.size)
 
 
-def _place_lines(discovery: Discovery[Fit]) -> tuple[list[Line], set[str]]:
+def _place_lines(discovery: Discovery[Fit]) -> tuple[list[SummaryRow], set[str]]:
     """A line for each place that acts, without its share, and the effects that these lines list."""
     end, alternatives = discovery.end, discovery.alternatives
     floor, unit = pool_in_milli(end)[1], milli_unit(end)
     added_effects = {step.name for step in discovery.steps}
-    lines, listed = list[Line](), set[str]()
+    lines, listed = list[SummaryRow](), set[str]()
     for place in discovery.findings.places:
         in_model = [c for c in place.causes if c in added_effects]
         free_form = f"{PREFIX}{place.name}"
@@ -93,12 +93,14 @@ def _place_lines(discovery: Discovery[Fit]) -> tuple[list[Line], set[str]]:
         rivals = dict.fromkeys([*place.inseparable_from, *(r for e in effects for r in alternatives.get(e, ()))])
         in_another_form = bool(effects) and free_form in added_effects
         size, certainty = place.size * floor, 1 - place.p_value
-        lines.append(Line(place.name, effects, possible, size, unit, 0.0, certainty, tuple(rivals), in_another_form))
+        lines.append(
+            SummaryRow(place.name, effects, possible, size, unit, 0.0, certainty, tuple(rivals), in_another_form)
+        )
         listed |= {*in_model, free_form}
     return lines, listed
 
 
-def _further_lines(discovery: Discovery[Fit], listed: Collection[str]) -> Iterator[Line]:
+def _further_lines(discovery: Discovery[Fit], listed: Collection[str]) -> Iterator[SummaryRow]:
     """A line for each further step, without its share; none for an effect that refines the form of a cause."""
     end, unit = discovery.end, milli_unit(discovery.end)
     added_effects = {step.name for step in discovery.steps}
@@ -112,7 +114,7 @@ def _further_lines(discovery: Discovery[Fit], listed: Collection[str]) -> Iterat
         effects = () if step.name.startswith(PREFIX) else (step.name,)
         place_name = place_of_effect(step.name) or "-"
         in_another_form = bool(effects) and f"{PREFIX}{place_name}" in added_effects
-        yield Line(place_name, effects, (), size, unit, 0.0, certainty, inseparable, in_another_form)
+        yield SummaryRow(place_name, effects, (), size, unit, 0.0, certainty, inseparable, in_another_form)
 
 
 def in_milli_rows(values: Array, fit: Fit) -> Array:

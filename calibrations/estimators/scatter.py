@@ -26,7 +26,7 @@ CURVATURE_STEP = 0.1  # of the logarithm of a ratio: a step in which the likelih
 FLAT = 2.0  # least curvature: a ratio is known to a factor of e, or its likelihood is no parabola
 
 
-class Level(NamedTuple):
+class LevelEstimate(NamedTuple):
     """A level (m,), the relative doubt of a slope on it, and the rms errors of it and of its change from row to row."""
 
     values: Array
@@ -35,7 +35,7 @@ class Level(NamedTuple):
     change_error: float
 
 
-def without_scatter(means: Array, readings: int) -> Level:
+def without_scatter(means: Array, readings: int) -> LevelEstimate:
     """The level below the scatter of a column's means (m,), in which each of `readings` readings holds until the next.
 
     Frequencies above those of the readings do not show their scatter, and are left out.
@@ -43,7 +43,7 @@ def without_scatter(means: Array, readings: int) -> Level:
     m = len(means)
     k = np.arange(1, min(m, readings))
     if len(k) < FEWEST_ORDINATES:
-        return Level(means, 0.0, 0.0, 0.0)
+        return LevelEstimate(means, 0.0, 0.0, 0.0)
     coefficients = dct(means, type=2, norm="ortho")[k]
     repeats, turn = max(1.0, m / readings), np.pi * k / (2 * m)
     power = (coefficients * repeats * np.sin(turn) / np.sin(repeats * turn)) ** 2  # as if none had been held
@@ -53,7 +53,7 @@ def without_scatter(means: Array, readings: int) -> Level:
     least = np.finfo(float).tiny
     scatter_variance = np.sum((coefficients * (1 - share)) ** 2) / max(float(np.sum(1 - share)), least)  # per ordinate
     errors = scatter_variance * share / m
-    return Level(
+    return LevelEstimate(
         values=np.asarray(idct(smoothed, type=2, norm="ortho")),
         doubt=doubt,
         error=float(np.sqrt(np.sum(errors))),

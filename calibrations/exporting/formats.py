@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from calibrations.exporting import autopilots, noise_files, robotics
-from calibrations.exporting.noise_files import Stream
+from calibrations.exporting.noise_files import ExportSettings
 from calibrations.exporting.simulated import ExportedFile, simulate
 from calibrations.model import Model
 
@@ -19,7 +19,7 @@ def export_model(
     form: str,
     comment: str,
     slot: autopilots.Slot,
-    stream: Stream,
+    settings: ExportSettings,
     reach: float | None = None,
     spans: Mapping[str, tuple[float, float]] | None = None,
 ) -> ExportedFile:
@@ -29,7 +29,7 @@ def export_model(
     ModelError if the format cannot hold such a sensor.
     """
     if form in NOISES:
-        return NOISES[form](models, stream, comment)
+        return NOISES[form](models, settings, comment)
     sensors = [simulate(model, reach, spans) for model in models]
     if form in AUTOPILOTS:
         return AUTOPILOTS[form](sensors, slot)

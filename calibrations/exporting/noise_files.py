@@ -26,7 +26,7 @@ WHY = "the format has white noise and a random walk"
 
 
 @dataclass(frozen=True)
-class Stream:
+class ExportSettings:
     """The topic and the rate of the measurements; random walks that the user states, by sensor, in SI units."""
 
     topic: str
@@ -34,22 +34,22 @@ class Stream:
     walks: Mapping[str, float]
 
 
-def kalibr(models: Sequence[Model], stream: Stream, comment: str) -> ExportedFile:
+def kalibr(models: Sequence[Model], settings: ExportSettings, comment: str) -> ExportedFile:
     """The file imu.yaml of Kalibr."""
-    numbers, losses, notes = _densities(models, stream, "kalibr")
-    lines = [f"# {comment}", *_lines(numbers), f"rostopic: {stream.topic}", f"update_rate: {stream.rate_hz:.6g}"]
+    numbers, losses, notes = _densities(models, settings, "kalibr")
+    lines = [f"# {comment}", *_lines(numbers), f"rostopic: {settings.topic}", f"update_rate: {settings.rate_hz:.6g}"]
     return ExportedFile("\n".join(lines) + "\n", losses, notes)
 
 
-def openvins(models: Sequence[Model], stream: Stream, comment: str) -> ExportedFile:
+def openvins(models: Sequence[Model], settings: ExportSettings, comment: str) -> ExportedFile:
     """The file kalibr_imu_chain.yaml of OpenVINS, with ideal intrinsics: calibrate the measurements before."""
-    numbers, losses, notes = _densities(models, stream, "openvins")
+    numbers, losses, notes = _densities(models, settings, "openvins")
     unit_rows = ["    - [1.0, 0.0, 0.0]", "    - [0.0, 1.0, 0.0]", "    - [0.0, 0.0, 1.0]"]
     zeros = ["    - [0.0, 0.0, 0.0]"] * 3
     lines = ["%YAML:1.0", f"# {comment}", "", "imu0:"]
     lines += ["  T_i_b:", *(f"    - [{', '.join('1.0' if i == k else '0.0' for k in range(4))}]" for i in range(4))]
     lines += [f"  {line}" for line in _lines(numbers)]
-    lines += [f"  rostopic: {stream.topic}", "  time_offset: 0.0", f"  update_rate: {stream.rate_hz:.1f}"]
+    lines += [f"  rostopic: {settings.topic}", "  time_offset: 0.0", f"  update_rate: {settings.rate_hz:.1f}"]
     lines += ['  model: "kalibr"']
     for name in ("Tw", "R_IMUtoGYRO", "Ta", "R_IMUtoACC"):
         lines += [f"  {name}:", *unit_rows]
@@ -64,7 +64,7 @@ def _lines(numbers: Mapping[str, float]) -> Iterator[str]:
 
 
 def _densities(
-    models: Sequence[Model], stream: Stream, program: str
+    models: Sequence[Model], settings: ExportSettings, program: str
 ) -> tuple[dict[str, float], tuple[Loss, ...], tuple[str, ...]]:
     """The four densities by name, the losses, and remarks. Raises ModelError if a sensor is missing."""
     by_sensor: dict[str, Model] = {}
@@ -84,7 +84,7 @@ def _densities(
         model = by_sensor[sensor]
         factor = _factor(model, sensor)
         white, walk = (factor * _largest_value(model, name) for name in (WHITE, WALK))
-        if stated_walk := stream.walks.get(sensor):
+        if stated_walk := settings.walks.get(sensor):
             walk = stated_walk
         if not walk:
             raise ModelError(

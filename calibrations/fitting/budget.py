@@ -35,7 +35,7 @@ SLOW_NOISE = "slow noise"
 
 
 @dataclass(frozen=True)
-class Line:
+class BudgetRow:
     """One source. Arrays have an entry for each parameter, in its unit; None where the source is not given.
 
     `sensitivity` is signed where the whole table has one error, else the root of the sum of squares.
@@ -54,10 +54,10 @@ class Line:
 class Budget:
     """All sources of all parameters of a fit; entries that the data do not determine are NaN."""
 
-    lines: tuple[Line, ...]
+    lines: tuple[BudgetRow, ...]
 
     @property
-    def given(self) -> tuple[Line, ...]:
+    def given(self) -> tuple[BudgetRow, ...]:
         """The sources that have a number."""
         return tuple(line for line in self.lines if line.std is not None)
 
@@ -112,7 +112,7 @@ def row_gains(fit: Fit) -> Array:
     return fit.noise.whiten_transposed(inverse.transpose(1, 2, 0)).transpose(2, 0, 1)
 
 
-def _of_type_a(fit: Fit, G: Array, square: float) -> list[Line]:
+def _of_type_a(fit: Fit, G: Array, square: float) -> list[BudgetRow]:
     """The lines of type A: the parts of the fit's own covariance.
 
     `square`: sum of the squares that errors of the inputs leave in the residual. It is not counted twice.
@@ -132,20 +132,20 @@ def _of_type_a(fit: Fit, G: Array, square: float) -> list[Line]:
         ("misfit of the model", share * misfit, free_rows),
     ]
     return [
-        Line(name, "A", "", None, None, np.sqrt(v), freedom)
+        BudgetRow(name, "A", "", None, None, np.sqrt(v), freedom)
         for name, v, freedom in parts
         if np.nanmax(v, initial=0.0) > 0
     ]
 
 
-def _of_type_b(fit: Fit, G: Array, c: Contribution) -> tuple[Line, float]:
+def _of_type_b(fit: Fit, G: Array, c: Contribution) -> tuple[BudgetRow, float]:
     """The line of an input that is not fitted, and the sum of squares that its errors leave in the residual."""
     if c.std is None:
-        return Line(c.source, "B", c.unit, None, None, None, c.freedom), 0.0
+        return BudgetRow(c.source, "B", c.unit, None, None, None, c.freedom), 0.0
     row_errors, number = _errors_of_rows(fit, c), c.shared(fit.table)
     by_error = input_effects(fit, G, c)
     sensitivity = by_error[0] if len(by_error) == 1 else np.sqrt(np.sum(by_error**2, axis=0))
-    line = Line(c.source, "B", c.unit, c.std, sensitivity, np.abs(sensitivity) * c.std, c.freedom)
+    line = BudgetRow(c.source, "B", c.unit, c.std, sensitivity, np.abs(sensitivity) * c.std, c.freedom)
     return line, c.std**2 * _remaining_square(row_errors, fit.jacobian, by_error, number)
 
 

@@ -16,7 +16,7 @@ from calibrations.effects import Effect
 from calibrations.errors import ModelError
 from calibrations.fitting.residual_forms import SMALLEST, estimate_by_residual
 from calibrations.fitting.solution import Solution
-from calibrations.free_forms.bases import Harmonics, Line
+from calibrations.free_forms.bases import Harmonics, StraightLine
 from calibrations.free_forms.chain import ModelEffects, State, start, state_at
 from calibrations.free_forms.components import Component, free
 from calibrations.free_forms.descent import SLOW_BEGIN, SLOW_MOST
@@ -105,9 +105,11 @@ def _completing_components(place: str, data: PoseData, first: State) -> list[Com
     if place in ("temperature-bias", "temperature-scale"):
         T = data.table.column("temperature_c")
         factor: Factor = "force" if place.endswith("scale") else ""
-        return [free(Form(place, "line", "temperature", (Line(float(T.min()), float(T.max())),), factor), first)]
+        return [
+            free(Form(place, "line", "temperature", (StraightLine(float(T.min()), float(T.max())),), factor), first)
+        ]
     if place == "column:std" and data.spread is not None:
-        lines = tuple(Line(float(q.min()), float(q.max())) for q in data.spread**2)
+        lines = tuple(StraightLine(float(q.min()), float(q.max())) for q in data.spread**2)
         return [free(Form(place, "line", "variance", lines), first)]
     return []
 

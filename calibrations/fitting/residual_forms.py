@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from calibrations.effects import Effect
 from calibrations.fitting.solution import Solution
-from calibrations.free_forms.bases import Clips, Line, Products, Settling, spline
+from calibrations.free_forms.bases import Clips, Products, Settling, StraightLine, spline
 from calibrations.free_forms.components import GENERAL, PRODUCT, Component
 from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.form import CROSS, Factor, Form
@@ -184,35 +184,52 @@ def _gram(fit: Solution, X: Array, base: NDArray[np.bool_], blocks: Mapping[str,
 
 
 def _forms(place: str, table: Table, force: Array) -> Sequence[Form]:
-    count = len(table.axes)
     if place in OF_FORCE:
-        driver, factor = OF_FORCE[place]
-        over = {"own": force, "cross": force[:, list(CROSS)], "out-of-plane": out_of_plane(force)}[driver]
-        curve = tuple(spline(over[:, k], INTERVALS[driver]) for k in range(count))
-        found = [Form(place, "curve", driver, curve, factor)]
-        return [*found, Form(place, "thresholds", "own", (Clips(THRESHOLDS_G),))] if place == "own-response" else found
+        return _forms_of_force(place, force, len(table.axes))
     if place in OF_TABLE:
-        driver, factor = OF_TABLE[place]
-        x = table.column("temperature_c") if driver == "temperature" else table.time_s
-        ends = float(x.min()), float(x.max())
-        found = [Form(place, "line", driver, (Line(*ends),), factor)]
-        found.append(Form(place, "curve", driver, (spline(x, INTERVALS[driver]),), factor))
-        if driver == "temperature" and "t_s" in table:
-            found += [Form(place, name, driver, (Line(*ends),), factor, lead_s=lead) for name, lead in LEADS_S.items()]
-        if driver == "time":
-            span = ends[1] - ends[0] or 1.0
-            found.append(Form(place, "settling", driver, (Settling(ends[0], span, span / len(x), AGES),), factor))
-        return found
+        return _forms_of_temperature_or_time(place, table)
     if place == "output":
         return [Form(place, "curve", "output", (spline(table.outputs.ravel(), INTERVALS[place]),), shared=True)]
     if place == "force":
         return [Form(place, "curve", "force", (Products(DEGREE),))]
     if place == "column:std":
         squares = [table.column(name) ** 2 for name in table.std_names]
-        lines = tuple(Line(float(q.min()), float(q.max())) for q in squares)
+        lines = tuple(StraightLine(float(q.min()), float(q.max())) for q in squares)
         return [Form(place, "line", "variance", lines)]
-    x = table.column(place.removeprefix("column:"))
-    line, curve = (Line(float(x.min()), float(x.max())),), (spline(x, COLUMN_INTERVALS),)
+    return _forms_of_column(place, table.column(place.removeprefix("column:")))
+
+
+def _forms_of_force(place: str, force: Array, count: int) -> list[Form]:
+    """Forms over a component of the forces (n, 3), for `count` axes."""
+    driver, factor = OF_FORCE[place]
+    over = {"own": force, "cross": force[:, list(CROSS)], "out-of-plane": out_of_plane(force)}[driver]
+    forms = [Form(place, "curve", driver, tuple(spline(over[:, k], INTERVALS[driver]) for k in range(count)), factor)]
+    if place == "own-response":
+        forms.append(Form(place, "thresholds", "own", (Clips(THRESHOLDS_G),)))
+    return forms
+
+
+def _forms_of_temperature_or_time(place: str, table: Table) -> list[Form]:
+    """A line and a curve; with times also a lag of the temperature; over time also a settling."""
+    driver, factor = OF_TABLE[place]
+    x = table.column("temperature_c") if driver == "temperature" else table.time_s
+    start, end = float(x.min()), float(x.max())
+    line = (StraightLine(start, end),)
+    forms = [
+        Form(place, "line", driver, line, factor),
+        Form(place, "curve", driver, (spline(x, INTERVALS[driver]),), factor),
+    ]
+    if driver == "temperature" and "t_s" in table:
+        forms += [Form(place, name, driver, line, factor, lead_s=lead) for name, lead in LEADS_S.items()]
+    if driver == "time":
+        span = end - start or 1.0
+        forms.append(Form(place, "settling", driver, (Settling(start, span, span / len(x), AGES),), factor))
+    return forms
+
+
+def _forms_of_column(place: str, x: Array) -> list[Form]:
+    """A line and a curve over a logged column (n,), each of the bias and of the scale factor."""
+    line, curve = (StraightLine(float(x.min()), float(x.max())),), (spline(x, COLUMN_INTERVALS),)
     return [
         Form(place, "line", place, line),
         Form(place, "curve", place, curve),

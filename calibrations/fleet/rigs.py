@@ -2,6 +2,18 @@
 
 A sensor at rest senses only the direction of gravity. So each error of the pose, also the tilt of the base, is a change
 of alpha and beta.
+
+The data of one sensor cannot separate its misalignment from its stage's zero offset. An error common to all sensors of
+one rig is the rig's. Over a fleet, parameter j of an effect on the pose, by sensor i of batch b on rig r, is
+
+    y_i = beta_b + rho_r + e_i        var e_i = tau^2 + v_i
+
+tau^2 is the variance between sensors of one batch on one rig (Paule and Mandel). The assignment of sensors to rigs
+is assumed to be random. rho is tested by F (Knapp and Hartung, 2003). The values of the rigs for the strongest effect
+are subtracted, and the search continues.
+
+The data cannot separate an error common to all rigs from one of the sensors' design, nor an error of a rig from one of
+a batch if each batch was on one rig. Errors are therefore relative to the median of the rigs that batches connect.
 """
 
 from __future__ import annotations
@@ -41,20 +53,6 @@ def correct_stage_errors(table: Table, errors: StageErrors, effects: Mapping[str
     columns["beta_deg"] = np.degrees(np.arctan2(gravity[:, 1], gravity[:, 0]))
     return replace(table, columns=MappingProxyType(columns))
 
-
-# Errors of rigs, from the sensors that they measured: an error common to all sensors of one rig is the rig's.
-#
-# The data of one sensor cannot separate its misalignment from its stage's zero offset. Over a fleet, parameter j of an
-# effect on the pose, by sensor i of batch b on rig r, is
-#
-#     y_i = beta_b + rho_r + e_i        var e_i = tau^2 + v_i
-#
-# tau^2 is the variance between sensors of one batch on one rig (Paule and Mandel). The assignment of sensors to rigs
-# is assumed to be random. rho is tested by F (Knapp and Hartung, 2003). The values of the rigs for the strongest effect
-# are subtracted, and the search continues.
-#
-# Inseparable: an error common to all rigs from one of the sensors' design, and an error of a rig from one of a batch
-# where each batch was on one rig. Errors are therefore relative to the median of the rigs that batches connect.
 
 LEAST_INFORMATION = 1e-8  # share of an information matrix: less is not known
 

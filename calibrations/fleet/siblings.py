@@ -4,10 +4,21 @@
 
 Parameters vary independently over the batch, but the estimates of one sensor are correlated, strongly so with few
 poses. One parameter is treated at a time: the others of each sensor are integrated over their batch distribution, which
-leaves y_i and v_i for `fit_siblings`. This repeats until the spreads converge. A parameter that a sensor's poses do not
+gives y_i and v_i for `fit_siblings`. This repeats until the spreads converge. A parameter that a sensor's poses do not
 determine gets the batch's prediction.
 
-Where sensors differ by much more than the uncertainty of a fit (tau >> std), pooling changes nothing.
+For one parameter, `fit_siblings` estimates the mean and the spread in the batch, and the value of each sensor:
+
+    y_i ~ N(theta_i, v_i)        theta_i ~ N(mu, tau^2)        flat in mu and in tau
+
+The posterior is exact except for a sum over a grid of tau: for a given tau all is normal, and the weight of each tau
+follows from the data. So the intervals include the uncertainty of mu and tau, also for a batch of few or equal
+sensors (tau near 0), where an estimate of tau alone gives too short intervals. An outlier is separated: it changes
+no sibling, and no sibling changes it.
+
+If sensors differ by much more than the uncertainty of a fit (tau >> std), pooling changes nothing.
+
+Source  Gelman et al., Bayesian Data Analysis (3rd ed.), 5.4-5.5, (5.20)-(5.21); Efron and Morris (1975).
 """
 
 from __future__ import annotations
@@ -22,17 +33,6 @@ from scipy.special import ndtr, stdtr
 from calibrations.criteria import FALSE_OUTLIER, FEWEST_SIBLINGS, MOST_USUAL
 from calibrations.means.noise import robust_std
 from calibrations.table import Array
-
-# One quantity of many siblings: its mean and spread in the batch, and the value of each sensor given these.
-#
-#     y_i ~ N(theta_i, v_i)        theta_i ~ N(mu, tau^2)        flat in mu and in tau
-#
-# The posterior is exact except for a sum over a grid of tau: for a given tau all is normal, and the weight of each tau
-# follows from the data. So the intervals include the uncertainty of mu and tau, also for a batch of few or equal
-# sensors (tau near 0), where an estimate of tau alone gives too short intervals. An outlier is separated: it changes
-# no sibling, and no sibling changes it.
-#
-# Source  Gelman et al., Bayesian Data Analysis (3rd ed.), 5.4-5.5, (5.20)-(5.21); Efron and Morris (1975).
 
 GRID = 80
 HALVINGS = 40

@@ -131,7 +131,7 @@ class Waves:
 
 
 @dataclass(frozen=True)
-class Line:
+class StraightLine:
     """A straight line, 0 in the middle of low .. high and +-1 at the ends."""
 
     low: float
@@ -310,4 +310,4 @@ class Ramp:
         return np.column_stack([np.ones(len(x)), np.abs(x), x])
 
 
-Basis = Spline | Harmonics | Waves | Line | Settling | Clips | Steps | Play | Preisach | Products | Ramp
+Basis = Spline | Harmonics | Waves | StraightLine | Settling | Clips | Steps | Play | Preisach | Products | Ramp

@@ -9,7 +9,7 @@ import numpy as np
 
 from calibrations.effects.kernels import play
 from calibrations.effects.logged import leading_temperature, reading_error
-from calibrations.free_forms.bases import Line, Play, Settling, Waves, spline
+from calibrations.free_forms.bases import Play, Settling, StraightLine, Waves, spline
 from calibrations.free_forms.chain import State
 from calibrations.free_forms.components import GENERAL, PRODUCT, Columns, Component, Make, Starts, free, per_axis
 from calibrations.free_forms.form import Factor, Form
@@ -171,7 +171,7 @@ def over_time(data: PoseData, first: State) -> list[Component]:
             name = f"{place}/{cause}@{tau:.3f}"
             price_with_choice = price + 2 * np.log(len(WARMING))
             components.append(_make_warm_up(data.axes, u, span, name, place, cause, price_with_choice, factor)((tau,)))
-        line = Form(place, "line", "time", (Line(begin, begin + span),), factor)
+        line = Form(place, "line", "time", (StraightLine(begin, begin + span),), factor)
         components.append(free(line, first, drift, price))
         components.append(free(Form(place, "curve", "time", (spline(t, 12),), factor), first, price=price))
         settling = Settling(begin, span, span / data.n, AGES)

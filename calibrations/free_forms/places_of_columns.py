@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibrations.effects.logged import level, level_is_known, reading_error
-from calibrations.free_forms.bases import Line, spline
+from calibrations.free_forms.bases import StraightLine, spline
 from calibrations.free_forms.chain import State
 from calibrations.free_forms.components import PRODUCT, Component, free, per_axis
 from calibrations.free_forms.form import Factor, Form
@@ -40,7 +40,7 @@ def over_output(data: PoseData, first: State) -> list[Component]:
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class ColumnReading:
     """Values of a column, or of a column an axis, (n,) each: as logged, or their level, with its relative rms error."""
 
     values: tuple[Array, ...]
@@ -62,17 +62,17 @@ class Reading:
         return f"{name}-of-level" if self.is_level else name
 
 
-def _readings(table: Table, names: Sequence[str], power: int = 1) -> list[Reading]:
+def _readings(table: Table, names: Sequence[str], power: int = 1) -> list[ColumnReading]:
     """Columns to a power as logged, and as their level where scatter is a part of them."""
     logged = tuple(table.column(name) ** power for name in names)
     levels = tuple(level(table, name, power) for name in names)
     scatter = max(float(np.std(x - y) / (np.std(y) or 1.0)) for x, y in zip(logged, levels, strict=True))
     if scatter < LEAST_SCATTER:
-        return [Reading(logged)]
+        return [ColumnReading(logged)]
     error = max(reading_error(table, name, power) for name in names)
-    raw = Reading(logged, error=float(np.hypot(scatter, error)))
+    raw = ColumnReading(logged, error=float(np.hypot(scatter, error)))
     level_known = all(level_is_known(table, name, power) for name in names)
-    return [raw, Reading(levels, True, error)] if level_known else [raw]
+    return [raw, ColumnReading(levels, True, error)] if level_known else [raw]
 
 
 def over_columns(data: PoseData, first: State) -> list[Component]:
@@ -92,7 +92,7 @@ def over_columns(data: PoseData, first: State) -> list[Component]:
     return components
 
 
-def _supply_component(supply: Reading) -> Component:
+def _supply_component(supply: ColumnReading) -> Component:
     """The output in proportion to the supply."""
     place, cause = "column:supply_v", "supply-sensitivity"
     (volts,) = supply.values
@@ -104,7 +104,7 @@ def _supply_component(supply: Reading) -> Component:
     )  # fmt: skip
 
 
-def _vibration_components(squares: Reading, first: State) -> list[Component]:
+def _vibration_components(squares: ColumnReading, first: State) -> list[Component]:
     """A bias over the mean square of the samples of each axis."""
     place, cause = "column:std", "vibration-rectification"
     columns = per_axis(lambda _, k: (squares.values[k] - squares.values[k].mean())[:, None])
@@ -119,10 +119,10 @@ def _vibration_components(squares: Reading, first: State) -> list[Component]:
     ]  # fmt: skip
 
 
-def _over_column(place: str, reading: Reading, first: State, cause: str = "") -> list[Component]:
+def _over_column(place: str, reading: ColumnReading, first: State, cause: str = "") -> list[Component]:
     """Bias and scale factor over a logged column, as a line, which is a form of the `cause`, and as a curve."""
     (x,) = reading.values
-    line, curve = (Line(float(x.min()), float(x.max())),), (spline(x, 8),)
+    line, curve = (StraightLine(float(x.min()), float(x.max())),), (spline(x, 8),)
     factors: tuple[tuple[str, Factor, float], ...] = (("", "", 0.0), ("scale-", "force", PRODUCT))
     components = []
     for prefix, factor, price in factors:

@@ -13,7 +13,7 @@ from scipy.special import chdtri  # scipy.stats takes 0.4 s to load
 
 from calibrations.criteria import LARGER_NOISE, LEAST_NOISE, SIGNIFICANT
 from calibrations.free_forms.acting_places import ActingPlace, places
-from calibrations.free_forms.bases import Line
+from calibrations.free_forms.bases import StraightLine
 from calibrations.free_forms.chain import Coefficients, ModelEffects
 from calibrations.free_forms.form import CROSS, Form
 from calibrations.free_forms.geometry import LINEAR_PART, Geometry, GeometryEffects, geometry
@@ -182,7 +182,7 @@ class Structure:
             return ()
         state, c = self.result.state, self.result.data.channels
         forces = state.force[:, list(CROSS)] if place == "cross-response" else out_of_plane(state.force)
-        lines = tuple(Line(float(forces[:, k].min()), float(forces[:, k].max())) for k in range(c))
+        lines = tuple(StraightLine(float(forces[:, k].min()), float(forces[:, k].max())) for k in range(c))
         size = 2 * self.geometry.lines[place]
         return (Form(place, "line", LINEAR[place], lines, sizes=(size,) * c, kept=(1,)),)
 

@@ -1,11 +1,28 @@
 """Reference acceleration from displacement: by the paper's method, and by a better one.
 
-The paper's: a second-order Butterworth low-pass at 20 Hz, freed of its delay and attenuation at the motion's frequency,
-then two differentiations (Ang V). It lets noise through that grows with the square of frequency up to the corner, and
-its correction holds at one frequency.
+The paper's method: a second-order Butterworth low-pass at 20 Hz, corrected for its delay and attenuation at the
+frequency of the motion, then two differentiations (Ang V). Its noise grows with the square of frequency up to the
+corner, and its correction is exact at one frequency only.
 
-The better one: strong lines are fitted as sines and differentiated exactly; what they leave goes through a
-Kalman smoother whose noise is fitted, so that starts, stops and motion of any form are followed.
+The better method has two parts. Sines are fitted to the strong lines and differentiated exactly. A Kalman smoother with
+a fitted noise follows the rest: starts, stops and motion of any form.
+
+Sine approximation: the sine that fits a record best, with standard uncertainties.
+
+    x(t) = offset + amplitude cos(2 pi f t + phase)
+
+The fit has three parameters if the frequency is known, otherwise four. The uncertainties follow from the density of the
+residual near the line, so they are also valid for correlated noise; for white noise they are the Cramer-Rao bound.
+
+Smoothing: the Kalman smoother of an integrated random walk.
+
+    x_k = s_k + e_k        D^3 s = w        e of variance r, w of variance q white
+
+The smoothed s solves (I + (r / q) D^3' D^3) s = x, a banded system. This equals the forward and backward passes of
+Rauch, Tung and Striebel with a diffuse start, and is a discrete smoothing spline of fifth degree (Wahba, 1990). r / q
+has the greatest restricted likelihood.
+
+Source  Ang V; ISO 16063-11 and IEEE Std 1057 (sine approximation).
 """
 
 from __future__ import annotations
@@ -27,14 +44,6 @@ from calibrations.motion.spectrum import (
     periodogram,
 )
 from calibrations.table import Array
-
-# Sine approximation: the sine that fits a record best, with standard uncertainties.
-#
-#     x(t) = offset + amplitude cos(2 pi f t + phase)
-#
-# Three parameters with the frequency given, four with the frequency fitted too: ISO 16063-11, IEEE Std 1057.
-# Uncertainties follow from the density of the residual near the line, so that they hold for correlated noise as
-# well; for white noise they are the Cramer-Rao bound.
 
 NEIGHBOURS = 100  # lines on each side that the density is taken from
 OWN_LINES = 3  # besides the frequency, which the fitted sine takes
@@ -141,14 +150,6 @@ def _density_near(residual: Array, rate_hz: float, frequency_hz: float) -> float
     lines = lines[np.abs(lines - k) >= OWN_LINES]
     return float(np.mean(power[lines])) if len(lines) else float(np.mean(residual**2) * 2 / rate_hz)
 
-
-# Smoothing of motion that is not a sine: the Kalman smoother of an integrated random walk, its noise fitted.
-#
-#     x_k = s_k + e_k        D^3 s = w        e of variance r, w of variance q white
-#
-# The smoothed s solves (I + (r / q) D^3' D^3) s = x, a banded system: it equals the forward and backward passes of
-# Rauch, Tung and Striebel with a diffuse start, and is a discrete smoothing spline of fifth degree (Wahba, 1990); r /
-# q is that of greatest restricted likelihood.
 
 ORDER = 3  # so that acceleration still has a derivative of finite variance
 LOG_RANGE = (float(np.log(1e-3)), float(np.log(1e12)))  # of r / q: noise far below the motion; rounding beyond

@@ -12,7 +12,7 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-import scipy  # its rooms, large and seldom needed, are loaded where they are first entered
+import scipy  # its modules load slowly: they are imported at their first use
 from numpy.typing import NDArray
 
 from calibrations.criteria import LONGEST_STEP, MOST_UNEVEN, SHORTEST_MOTION_S

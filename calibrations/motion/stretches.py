@@ -1,7 +1,14 @@
 """A record of motion as rows for a fit: the lines of the motion as templates of the output, and the noise near them.
 
-The white noise of a line is the density of the output beside it, without what follows the motion: a noise model without
-parameters (Pintelon and Schoukens, System Identification: A Frequency Domain Approach, 2012).
+Ten thousand samples behind an output filter are not independent, and most of their band has only noise. So a record
+is cut into some thirty stretches of a whole number of periods. Each stretch is reduced to its mean and to its parts
+in phase and in quadrature with each line of the motion, as in a lock-in amplifier. Each of these parts is a channel,
+and their rows are independent.
+
+    weights . samples = rows            the model's prediction is reduced by the same weights as the measurement
+
+The white noise of a line is the density of the output near it, without the part that follows the motion: a noise model
+without parameters (Pintelon and Schoukens, System Identification: A Frequency Domain Approach, 2012).
 """
 
 from __future__ import annotations
@@ -26,7 +33,7 @@ INLYING_MEAN = 0.934  # of an exponential distribution below LEAST_LINE medians
 
 
 @dataclass(frozen=True)
-class Line:
+class ResidualLine:
     """The output by one line of amplitude 1, and its derivative; shape (samples,) each."""
 
     name: str
@@ -37,9 +44,9 @@ class Line:
 
 def residual_lines(
     samples: Table, references: Sequence[Reference], expected: Array, length_s: float
-) -> tuple[Line, ...]:
+) -> tuple[ResidualLine, ...]:
     """The lines that a stretch of this length resolves, strongest first, and the residual motion."""
-    lines: list[Line] = []
+    lines: list[ResidualLine] = []
     residual = expected.copy()
     for f in _frequencies(references, length_s):
         in_phase, in_quadrature = np.zeros(samples.n), np.zeros(samples.n)
@@ -51,7 +58,7 @@ def residual_lines(
             c, s = np.array([c, s]) / np.hypot(c, s)
             in_phase[record.rows] = waves[:, :2] @ (c, s)
             in_quadrature[record.rows] = waves[:, :2] @ (s, -c)
-        lines.append(Line(f"at {f:.4g} Hz", f, in_phase, in_quadrature))
+        lines.append(ResidualLine(f"at {f:.4g} Hz", f, in_phase, in_quadrature))
     return (*lines, _broadband(samples, residual, bool(lines)))
 
 
@@ -64,19 +71,19 @@ def _frequencies(references: Sequence[Reference], length_s: float) -> list[float
     return frequencies
 
 
-def _broadband(samples: Table, residual: Array, has_lines: bool) -> Line:
+def _broadband(samples: Table, residual: Array, has_lines: bool) -> ResidualLine:
     """Motion without a line: its own form, and its derivative; the noise is that at the middle of its spectrum."""
     slope, middle = np.zeros(samples.n), []
     for record in find_records(samples):
         slope[record.rows] = np.gradient(residual[record.rows])
         f, power = periodogram(residual[record.rows], record.rate_hz)
         middle.append(float(np.sum(f * power) / max(float(np.sum(power)), np.finfo(float).tiny)))
-    return Line(
+    return ResidualLine(
         "with the rest of the motion" if has_lines else "with the motion", float(np.mean(middle)), residual, -slope
     )
 
 
-def noise_density(samples: Table, lines: Sequence[Line], axis: int) -> Array:
+def noise_density(samples: Table, lines: Sequence[ResidualLine], axis: int) -> Array:
     """One-sided density of one axis near 0 Hz and near each line, shape (1 + lines,)."""
     low_pass = first_order(corner_hz(samples))
     pieces = [_spectrum(samples, lines, axis, record.rows, record.rate_hz) for record in find_records(samples)]
@@ -91,7 +98,9 @@ def noise_density(samples: Table, lines: Sequence[Line], axis: int) -> Array:
     return np.array([density_near(at_hz) for at_hz in (0.0, *(line.at_hz for line in lines))])
 
 
-def _spectrum(samples: Table, lines: Sequence[Line], axis: int, rows: slice, rate_hz: float) -> tuple[Array, Array]:
+def _spectrum(
+    samples: Table, lines: Sequence[ResidualLine], axis: int, rows: slice, rate_hz: float
+) -> tuple[Array, Array]:
     """(frequency, density) of the output without what follows the motion, the regions of the lines, and drift."""
     v = samples.outputs[rows, axis]
     columns = [np.ones(len(v)), np.linspace(-1, 1, len(v))]
@@ -105,15 +114,6 @@ def _spectrum(samples: Table, lines: Sequence[Line], axis: int, rows: slice, rat
     excluded[-1] = True  # half the sampling rate has another distribution
     return f[~excluded], density[~excluded]
 
-
-# The rows of a record.
-#
-# Ten thousand samples behind an output filter are not independent, and most of their band has only noise. So a record
-# is cut into some thirty stretches of a whole number of periods. Each stretch is reduced to its mean and to its parts
-# in phase and in quadrature with each line of the motion, as in a lock-in amplifier. Each of these parts is a channel,
-# and their rows are independent.
-#
-#     weights . samples = rows            the model's prediction is reduced by the same weights as the measurement
 
 STRETCHES = 30  # of all records together; slow noise wants 20
 EDGE_S = 0.25  # left out at each end of a record: filters settle
@@ -131,7 +131,7 @@ class Stretches(Table):
     """
 
     samples: Table
-    lines: tuple[Line, ...]
+    lines: tuple[ResidualLine, ...]
     weights: csr_array
     channels: tuple[str, ...]
     white: Array
@@ -169,8 +169,8 @@ def make_stretches(table: Table) -> Stretches:
 
 
 def _visible_lines(
-    samples: Table, lines: tuple[Line, ...], cuts: list[tuple[int, int]], expected: Array
-) -> tuple[Line, ...]:
+    samples: Table, lines: tuple[ResidualLine, ...], cuts: list[tuple[int, int]], expected: Array
+) -> tuple[ResidualLine, ...]:
     """The lines above a row's noise in at least one stretch; the strongest line always."""
     amplitudes = np.abs((_weights(lines, cuts, samples.n) @ expected).reshape(-1, len(cuts)))
     white = _white(samples, lines, cuts)[: len(amplitudes)]
@@ -178,7 +178,9 @@ def _visible_lines(
     return tuple(line for k, line in enumerate(lines) if k == 0 or visible[2 * k + 1])
 
 
-def _rows(table: Table, samples: Table, lines: Sequence[Line], cuts: list[tuple[int, int]], slope: float) -> Stretches:
+def _rows(
+    table: Table, samples: Table, lines: Sequence[ResidualLine], cuts: list[tuple[int, int]], slope: float
+) -> Stretches:
     means = {name: np.array([values[a:b].mean() for a, b in cuts]) for name, values in samples.columns.items()}
     parts = ["mean", *(f"{phase} {line.name}" for line in lines for phase in ("in phase", "in quadrature"))]
     return Stretches(
@@ -249,7 +251,7 @@ def _cuts(samples: Table, length_s: float) -> Iterator[tuple[int, int]]:
         yield from zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)
 
 
-def _weights(lines: Sequence[Line], cuts: list[tuple[int, int]], n: int) -> csr_array:
+def _weights(lines: Sequence[ResidualLine], cuts: list[tuple[int, int]], n: int) -> csr_array:
     """Rows part by part: the mean, and the amplitude along each template, orthogonal to the earlier ones."""
     templates = np.column_stack([np.ones(n), *(t for line in lines for t in (line.in_phase, line.in_quadrature))])
     values, columns = [], []
@@ -264,7 +266,7 @@ def _weights(lines: Sequence[Line], cuts: list[tuple[int, int]], n: int) -> csr_
     return csr_array((np.concatenate(data), columns_of_data, starts), shape=(len(data), n))
 
 
-def _white(samples: Table, lines: Sequence[Line], cuts: list[tuple[int, int]]) -> Array:
+def _white(samples: Table, lines: Sequence[ResidualLine], cuts: list[tuple[int, int]]) -> Array:
     """Standard deviation of each part by white noise, shape (channels, rows): the density near its line."""
     rate_hz = find_records(samples)[0].rate_hz
     lengths = np.array([b - a for a, b in cuts])

@@ -21,11 +21,11 @@ from calibrations.effects.effect import Effect
 from calibrations.model import Estimate
 from calibrations.model.file import read_model
 from calibrations.noise.comparison import deviation
-from calibrations.noise.deviations import OCTAVE_KINDS, OVERLAPPING, Curve
+from calibrations.noise.deviations import OCTAVE_KINDS, OVERLAPPING, DeviationCurve
 from calibrations.noise.doubts import MISFITS, Disturbance, disturbance_document, disturbances
 from calibrations.noise.fit import upper_bound
 from calibrations.noise.likelihood import ChannelFit
-from calibrations.noise.lines import Line
+from calibrations.noise.lines import SpectralLine
 from calibrations.noise.record import Channel, Still
 from calibrations.noise.samples import CONSTANT, WILD, HiddenNoise, hidden_in
 from calibrations.noise.search import Search, search
@@ -70,7 +70,7 @@ class ChannelNoise:
 
     search: Search
     fit: ChannelFit
-    deviations: Mapping[str, Curve]  # by kind, of the record as it is
+    deviations: Mapping[str, DeviationCurve]  # by kind, of the record as it is
 
     @property
     def channel(self) -> Channel:
@@ -85,17 +85,17 @@ class ChannelNoise:
         return self.channel.unit
 
     @property
-    def allan(self) -> Curve:
+    def allan(self) -> DeviationCurve:
         """The overlapping Allan deviation of the record without any correction."""
         return self.deviations[OVERLAPPING]
 
     @property
-    def cleaned_allan(self) -> Curve:
+    def cleaned_allan(self) -> DeviationCurve:
         """The Allan deviation without the disturbances that were removed."""
         return self.search.still.allan[self.axis]
 
     @property
-    def lines(self) -> tuple[Line, ...]:
+    def lines(self) -> tuple[SpectralLine, ...]:
         """Sinusoids, strongest first."""
         return self.fit.lines
 
@@ -260,7 +260,7 @@ def _channel(noise: ChannelNoise) -> Document:
     }
 
 
-def _curve(curve: Curve) -> dict[str, list[float]]:
+def _curve(curve: DeviationCurve) -> dict[str, list[float]]:
     columns = {"tau_s": curve.tau_s, "deviation": curve.deviation, "low": curve.low, "high": curve.high}
     return {name: values.tolist() for name, values in columns.items()}
 

@@ -25,7 +25,7 @@ from calibrations.noise.signal import PLACE, TEMPERATURE, SignalSearch, search_s
 
 
 @dataclass(frozen=True)
-class Calibration:
+class TemperatureCalibration:
     """Effects of temperature on a record: their search, and the search for noise `after` they are removed."""
 
     start: NoiseFit
@@ -78,7 +78,7 @@ class Calibration:
         return {self.signal.causes[0]: experiment} if experiment and self.alternatives else {}
 
 
-def calibrate(search_before: Search, start: NoiseFit, effects: Mapping[str, Effect]) -> Calibration | None:
+def calibrate(search_before: Search, start: NoiseFit, effects: Mapping[str, Effect]) -> TemperatureCalibration | None:
     """Effects of temperature on the record of `search_before`; None if there are none beyond the model."""
     model_terms = signal_terms(start.model)
     warm = tuple(
@@ -95,7 +95,9 @@ def calibrate(search_before: Search, start: NoiseFit, effects: Mapping[str, Effe
         return None
     model = with_terms(start.model, signal.steps[-1])
     search_after = search(fit(model, start.still).still, model, effects)
-    return Calibration(start, signal, warm, search_after, {name: effect.contains for name, effect in effects.items()})
+    return TemperatureCalibration(
+        start, signal, warm, search_after, {name: effect.contains for name, effect in effects.items()}
+    )
 
 
 def _without_costly_curves(

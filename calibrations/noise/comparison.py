@@ -29,10 +29,10 @@ from calibrations.criteria import FEWEST_LEVEL_ORDINATES, FILTER_PERIODS, NEGLIG
 from calibrations.discovery.findings import Place
 from calibrations.errors import DataError
 from calibrations.model import Model
-from calibrations.noise.deviations import Curve
+from calibrations.noise.deviations import DeviationCurve
 from calibrations.noise.fit import NoiseFit, noise_terms, without_effects
 from calibrations.noise.likelihood import ChannelFit, Values, effect_lines, effect_spectrum
-from calibrations.noise.lines import Line, means_without
+from calibrations.noise.lines import SpectralLine, means_without
 from calibrations.noise.record import Channel, Still
 from calibrations.noise.signal import signal_terms, without_signal
 from calibrations.spectrum import Bands, Sampling
@@ -110,7 +110,7 @@ class DeviationComparison:
         return float(np.sqrt(np.average(square, weights=self.edf)))
 
 
-def compare_deviations(fit: ChannelFit, curve: Curve) -> DeviationComparison:
+def compare_deviations(fit: ChannelFit, curve: DeviationCurve) -> DeviationComparison:
     """The measured curve and that of the model. A variance is distributed as chi-square over its degrees of freedom."""
     is_tested = curve.tau_s >= (FILTER_PERIODS / fit.channel.corner_hz if np.isfinite(fit.channel.corner_hz) else 0.0)
     tau_s, measured, edf = curve.tau_s[is_tested], curve.deviation[is_tested], curve.edf[is_tested]
@@ -254,7 +254,9 @@ def evaluate(model: Model, still: Still) -> NoiseFit | None:
     return NoiseFit(still, replace(model, unit=still.unit), tuple(channels), fitted=False)
 
 
-def _with_values(channel: Channel, lines: tuple[Line, ...], values: dict[str, Values], model: Model) -> ChannelFit:
+def _with_values(
+    channel: Channel, lines: tuple[SpectralLine, ...], values: dict[str, Values], model: Model
+) -> ChannelFit:
     effects = tuple(term.effect for term in noise_terms(model) if "spectrum" in term.effect.places)
     complete = tuple(effect for effect in effects if all(p.name in values[effect.name] for p in effect.parameters))
     return replace(without_effects(channel, lines), effects=complete, values={e.name: values[e.name] for e in complete})

@@ -20,7 +20,7 @@ from calibrations.effects import Effect
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import ModelError
 from calibrations.model import Model
-from calibrations.noise.calibration import Calibration, calibrate
+from calibrations.noise.calibration import TemperatureCalibration, calibrate
 from calibrations.noise.comparison import compared_deviations, evaluate, mismatch, places
 from calibrations.noise.doubts import (
     alternatives,
@@ -63,7 +63,7 @@ class _SignalFindings:
     lags: tuple[str, ...] = ()
 
 
-def _signal_findings(calibration: Calibration, baseline: NoiseFit, missing: Search) -> _SignalFindings:
+def _signal_findings(calibration: TemperatureCalibration, baseline: NoiseFit, missing: Search) -> _SignalFindings:
     steps = calibration.steps(baseline, missing.patterns)
     return _SignalFindings(
         steps,

@@ -61,7 +61,7 @@ OCTAVE_KINDS: Mapping[str, tuple[int, float]] = MappingProxyType(  # kept square
 
 
 @dataclass(frozen=True)
-class Curve:
+class DeviationCurve:
     """A deviation over averaging time; shapes (k,), in the unit of the values, intervals of 95 %."""
 
     kind: str
@@ -85,7 +85,7 @@ class Octaves:
         self._offset: float | None = None
         self._tree = empty_tree()
         self._whole: Tree | None = None
-        self._curves: dict[str, Curve] = {}
+        self._curves: dict[str, DeviationCurve] = {}
 
     def add(self, samples: Array) -> None:
         """The next samples, of any real type, shape (n,)."""
@@ -102,13 +102,13 @@ class Octaves:
         """Samples so far."""
         return int(self._tree.bin_counts[0])
 
-    def curve(self, kind: str = OVERLAPPING) -> Curve:
+    def curve(self, kind: str = OVERLAPPING) -> DeviationCurve:
         """The deviation at 1, 2, 4 ... samples, as far as the record has two windows (hadamard: three)."""
         if kind not in self._curves:
             self._curves[kind] = self._curve(kind)
         return self._curves[kind]
 
-    def _curve(self, kind: str) -> Curve:
+    def _curve(self, kind: str) -> DeviationCurve:
         if self._whole is None:
             self._whole = deepcopy(self._tree)
             finish(self._whole, self._third)
@@ -117,10 +117,10 @@ class Octaves:
         tau_s = np.array([2.0**octave for octave, _ in enumerate(rows)]) / self._rate_hz
         value, edf = (np.array([row[k] for row in rows], dtype=float) for k in (0, 1))
         bounds = np.array([interval(*row[:2]) for row in rows]).reshape(-1, 2)
-        return Curve(kind, tau_s, value, bounds[:, 0], bounds[:, 1], tuple(row[2] for row in rows), edf)
+        return DeviationCurve(kind, tau_s, value, bounds[:, 0], bounds[:, 1], tuple(row[2] for row in rows), edf)
 
 
-def octaves(blocks: Iterable[Array], rate_hz: float, kind: str = OVERLAPPING) -> Curve:
+def octaves(blocks: Iterable[Array], rate_hz: float, kind: str = OVERLAPPING) -> DeviationCurve:
     """The curve of a record that comes in blocks, shape (n,) each."""
     reduction = Octaves(rate_hz, OCTAVE_KINDS[kind][0] != ALLAN)
     for block in blocks:
@@ -286,7 +286,7 @@ def _deviation(phase: Array, m: int) -> float:
     return float(np.sqrt(second_order(phase, m, 0) / windows / 2) / m) if windows > 0 else np.nan
 
 
-def curve_at(values: Array, rate_hz: float, tau_s: Sequence[float], source: str) -> Curve:
+def curve_at(values: Array, rate_hz: float, tau_s: Sequence[float], source: str) -> DeviationCurve:
     """Allan deviations of values (n,) at averaging times (k,), each rounded to a whole number of samples.
 
     Raises DataError for a time below one sample, TooFewRows for one of which the record does not hold two.
@@ -298,7 +298,7 @@ def curve_at(values: Array, rate_hz: float, tau_s: Sequence[float], source: str)
         [freedom(OVERLAPPING, a, len(values), m, overlap_of(m, a)) for a, m in zip(alphas, steps, strict=True)]
     )
     bounds = np.array([interval(*pair) for pair in zip(deviation.tolist(), edf.tolist(), strict=True)])
-    return Curve(OVERLAPPING, np.array(steps) / rate_hz, deviation, bounds[:, 0], bounds[:, 1], alphas, edf)
+    return DeviationCurve(OVERLAPPING, np.array(steps) / rate_hz, deviation, bounds[:, 0], bounds[:, 1], alphas, edf)
 
 
 def _steps(tau_s: float, n: int, rate_hz: float, source: str) -> int:
@@ -321,7 +321,7 @@ def _noise_type_at(values: Array, m: int) -> int:
     return noise_type(len(means), moments_of(means - means.mean())) or 0
 
 
-def minimum_s(curve: Curve) -> float | None:
+def minimum_s(curve: DeviationCurve) -> float | None:
     """The averaging time, s, of the lowest deviation, where some longer one is higher by more than chance."""
     lowest = int(np.argmin(curve.deviation))
     longer = curve.tau_s > curve.tau_s[lowest]

@@ -32,7 +32,7 @@ from calibrations.design.experiment import TWO_HZ, Experiment, experiment_by_phy
 from calibrations.noise.comparison import noise_levels, stretches
 from calibrations.noise.fit import fit_effects
 from calibrations.noise.likelihood import ChannelFit
-from calibrations.noise.lines import Line, strongest_line
+from calibrations.noise.lines import SpectralLine, strongest_line
 from calibrations.noise.patterns import DRIFT, FOLLOWS, SETTLING, STEP, Pattern
 from calibrations.noise.record import Channel
 from calibrations.noise.samples import hidden_in
@@ -122,7 +122,7 @@ def disturbance_document(disturbance: Disturbance) -> dict[str, Any]:
 
 def _line(fit: ChannelFit) -> Disturbance | None:
     line = strongest_line(fit.channel, fit.lines, fit.level)
-    if not isinstance(line, Line):
+    if not isinstance(line, SpectralLine):
         return None
     axis = fit.channel.axis
     return Disturbance(LINE, axis, f"a line of {axis} at {line.frequency_hz:.6g} Hz, of amplitude {line.amplitude:.3g}")

@@ -36,7 +36,7 @@ from calibrations.noise.likelihood import (
     profile,
     unit_spectrum,
 )
-from calibrations.noise.lines import Line, bands, strongest_line
+from calibrations.noise.lines import SpectralLine, bands, strongest_line
 from calibrations.noise.record import Channel, Still
 from calibrations.noise.samples import hidden_in
 from calibrations.noise.signal import signal_terms, without_signal
@@ -274,7 +274,7 @@ def find_lines(channel: Channel, effects: Sequence[Effect], max_lines: int) -> C
 
     `line_bound` is the amplitude that one more might have.
     """
-    lines: list[Line] = []
+    lines: list[SpectralLine] = []
     while True:
         remaining = without_effects(channel, lines)
         strongest = strongest_line(channel, tuple(lines), fit_effects(remaining, effects).level)
@@ -286,7 +286,7 @@ def find_lines(channel: Channel, effects: Sequence[Effect], max_lines: int) -> C
         lines.append(strongest)
 
 
-def without_effects(channel: Channel, lines: Iterable[Line] = ()) -> ChannelFit:
+def without_effects(channel: Channel, lines: Iterable[SpectralLine] = ()) -> ChannelFit:
     """One channel's spectrum less given lines, with no effect."""
     lines = tuple(lines)
     return ChannelFit(channel, bands(channel, lines), lines, (), {})

@@ -21,7 +21,7 @@ from scipy.special import chdtri, digamma
 
 from calibrations.effects import Effect
 from calibrations.effects import Values as EffectValues
-from calibrations.noise.lines import Line, Lines
+from calibrations.noise.lines import Lines, SpectralLine
 from calibrations.noise.record import Channel
 from calibrations.spectrum import Bands
 from calibrations.table import Array
@@ -211,6 +211,6 @@ def unit_spectrum(effect: Effect, parts: Sequence[Bands], shape: Values) -> Arra
     return effect_spectrum(effect, parts, {effect.parameters[0].name: 1.0, **shape})
 
 
-def effect_lines(effect: Effect, values: Values) -> tuple[Line, ...]:
+def effect_lines(effect: Effect, values: Values) -> tuple[SpectralLine, ...]:
     """The sinusoids of an effect, of phase 0."""
-    return tuple(Line(f_hz, amplitude, 0.0) for f_hz, amplitude in effect.lines(EffectValues.of(values)))
+    return tuple(SpectralLine(f_hz, amplitude, 0.0) for f_hz, amplitude in effect.lines(EffectValues.of(values)))

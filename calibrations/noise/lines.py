@@ -32,7 +32,7 @@ WINDOW_LOSS = 1.5  # of variance, by the window
 
 
 @dataclass(frozen=True)
-class Line:
+class SpectralLine:
     """A sinusoid: Hz, and the values' unit; `std` and `std_hz` are standard uncertainties."""
 
     frequency_hz: float
@@ -56,7 +56,7 @@ def windowed_density(means: Array, sampling: Sampling) -> Array:
 
 def without_line(
     means: Array, power: Array, sampling: Sampling, expected: Callable[[Array], Array], highest_hz: float
-) -> tuple[Array, Line] | float:
+) -> tuple[Array, SpectralLine] | float:
     """Remove the strongest sinusoid from means (n,): (the rest, the sinusoid). `power`: their windowed density.
 
     If no sinusoid exceeds the noise, returns only the amplitude that one might have.
@@ -77,7 +77,7 @@ def without_line(
     response = abs(np.sin(np.pi * turns / n) / (sampling.size * np.sin(np.pi * turns / n / sampling.size)))
     std = np.sqrt(2 * WINDOW_LOSS * noise[best] / (n * dt)) / response
     std_hz = np.sqrt(12) / (2 * np.pi * n * dt) * std * response / abs(tone)
-    line = Line(turns / (n * dt), float(abs(tone)) / response, float(std), float(std_hz))
+    line = SpectralLine(turns / (n * dt), float(abs(tone)) / response, float(std), float(std_hz))
     return means - (tone * wave.conj()).real, line
 
 
@@ -107,7 +107,9 @@ def _median_around(density: Array) -> Array:
     return medians
 
 
-def fast_lines(f: Array, density: Array, freedom: float, above_hz: float, length_s: float) -> tuple[Array, list[Line]]:
+def fast_lines(
+    f: Array, density: Array, freedom: float, above_hz: float, length_s: float
+) -> tuple[Array, list[SpectralLine]]:
     """(densities (f,) with the lines taken off, the lines above a frequency, strongest first)."""
     background = _median_around(density)
     lines, remaining = [], density.copy()
@@ -121,18 +123,18 @@ def fast_lines(f: Array, density: Array, freedom: float, above_hz: float, length
         amplitude = float(np.sqrt(4 * (f[1] - f[0]) * excess.sum()))
         std = float(np.sqrt(2 * WINDOW_LOSS * background[best] / length_s))
         lines.append(
-            Line(float(np.sum(f[lobe] * excess) / excess.sum()), amplitude, std, CENTROID * float(f[1] - f[0]))
+            SpectralLine(float(np.sum(f[lobe] * excess) / excess.sum()), amplitude, std, CENTROID * float(f[1] - f[0]))
         )
         remaining[lobe] = background[lobe]
     return remaining, sorted(lines, key=lambda line: -line.amplitude)
 
 
-Lines = tuple[Line, ...]
+Lines = tuple[SpectralLine, ...]
 REACH = 16  # ordinates to each side that a line has a share in
 LEAST_DENSITY = 0.05  # of the density around it, where a line was removed
 
 
-def bands(channel: Channel, lines: Iterable[Line] = ()) -> tuple[Bands, ...]:
+def bands(channel: Channel, lines: Iterable[SpectralLine] = ()) -> tuple[Bands, ...]:
     """Slow bands of the means, and fast ones where the record has stretches for them, less `lines`."""
     lines = tuple(lines)
     slow = slow_bands(means_without(channel, lines), channel.sampling, channel.corner_hz)
@@ -145,7 +147,7 @@ def bands(channel: Channel, lines: Iterable[Line] = ()) -> tuple[Bands, ...]:
     return (slow, fast) if len(fast.density) else (slow,)
 
 
-def means_without(channel: Channel, lines: Iterable[Line]) -> Array:
+def means_without(channel: Channel, lines: Iterable[SpectralLine]) -> Array:
     """The means (m,) less the lines, each of its amplitude and of the phase that fits best."""
     values = channel.means
     for line in lines:
@@ -168,7 +170,7 @@ def mean_response(sampling: Sampling, frequency_hz: float) -> float:
     return float(abs(np.sin(half * sampling.size) / (sampling.size * np.sin(half))))
 
 
-def fast_without(channel: Channel, lines: Iterable[Line]) -> tuple[Array, Array]:
+def fast_without(channel: Channel, lines: Iterable[SpectralLine]) -> tuple[Array, Array]:
     """(frequencies, densities) of the ordinates that the means' bands do not reach, less the lines."""
     f, density = channel.segments.frequency_hz, channel.segments.density
     above_hz = min(0.5 / channel.sampling.interval_s, channel.corner_hz / 2)
@@ -191,7 +193,7 @@ def _window_density(off_hz: Array, rate_hz: float) -> Array:
     return np.asarray(np.abs(np.exp(-2j * np.pi * turns) @ WINDOW) ** 2 / (4 * rate_hz * np.sum(WINDOW**2)))
 
 
-def strongest_line(channel: Channel, known_lines: Lines, level: Callable[[Array], Array]) -> Line | float:
+def strongest_line(channel: Channel, known_lines: Lines, level: Callable[[Array], Array]) -> SpectralLine | float:
     """The strongest line beside those that are known, above the `level` of the means' continuous spectrum at f (k,).
 
     Where none stands out, the amplitude that one might have.
@@ -216,7 +218,7 @@ def _level_around(power: Array, length_s: float) -> Callable[[Array], Array]:
     return lambda f: np.asarray(np.exp(logs[np.round(f * length_s).astype(int)] + np.euler_gamma))
 
 
-def _unfold(seen_hz: float, line: Line, channel: Channel) -> float | None:
+def _unfold(seen_hz: float, line: SpectralLine, channel: Channel) -> float | None:
     """The frequency that a line of the means really has, where it may be the folded image of this fast one."""
     rate_hz = 1 / channel.sampling.interval_s
     turns = np.round(line.frequency_hz / rate_hz)

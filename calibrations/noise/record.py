@@ -18,8 +18,8 @@ from calibrations.criteria import FEWEST_SAMPLES
 from calibrations.errors import DataError, TooFewRows
 from calibrations.estimators.scatter import without_scatter
 from calibrations.model import Term
-from calibrations.noise.deviations import OCTAVE_KINDS, OVERLAPPING, Curve, Octaves
-from calibrations.noise.samples import Ends, Oddity, Outliers, Steps, Stuck, hidden_in, oddities
+from calibrations.noise.deviations import OCTAVE_KINDS, OVERLAPPING, DeviationCurve, Octaves
+from calibrations.noise.samples import Ends, Oddity, Outliers, StepAndRange, Stuck, hidden_in, oddities
 from calibrations.spectrum import Means, Sampling, Segments, Welch
 from calibrations.table import Array
 
@@ -72,7 +72,7 @@ class Reduction:
     def __init__(self, rate_hz: float, corner_hz: float = np.inf, third_order: bool = True) -> None:
         self.rate_hz, self.corner_hz = rate_hz, corner_hz
         self.octaves, self.means, self.welch = Octaves(rate_hz, third_order), Means(), Welch(rate_hz)
-        self._ends, self._outliers, self._stuck, self._steps = Ends(), Outliers(), Stuck(), Steps()
+        self._ends, self._outliers, self._stuck, self._steps = Ends(), Outliers(), Stuck(), StepAndRange()
 
     @property
     def n(self) -> int:
@@ -200,11 +200,11 @@ class Still:
     source: str
     unit: str
     channels: tuple[Channel, ...]
-    allan: Mapping[str, Curve]
+    allan: Mapping[str, DeviationCurve]
     digest: str  # SHA-256 of all samples
     constants: Mapping[str, str | float] = field(default_factory=dict)  # constants of the sensor
     sensed: Mapping[str, Sensed] = field(default_factory=dict)
-    deviations: Mapping[str, Mapping[str, Curve]] = field(default_factory=dict)  # by axis and kind
+    deviations: Mapping[str, Mapping[str, DeviationCurve]] = field(default_factory=dict)  # by axis and kind
     signal: tuple[Term, ...] = ()  # of a model, taken off the means
 
     @property
@@ -260,7 +260,7 @@ def reduce_record(
     Raises DataError naming a sample that is no number, or a channel that is constant or clipped; TooFewRows.
     """
     digest, channels, unit = hashlib.sha256(), [], ""
-    curves: dict[str, dict[str, Curve]] = {}
+    curves: dict[str, dict[str, DeviationCurve]] = {}
     for samples in records:
         reduction = Reduction(samples.rate_hz, samples.corner_hz, every_deviation)
         for values in reduction.read(samples.blocks, f"{source}, channel {samples.name or samples.axis}"):

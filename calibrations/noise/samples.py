@@ -40,7 +40,7 @@ from calibrations.criteria import (
     WILD_SAMPLE,
 )
 from calibrations.errors import DataError
-from calibrations.noise.deviations import Curve
+from calibrations.noise.deviations import DeviationCurve
 from calibrations.table import Array
 
 LEAST = LEAST_DITHER**2 + 1 / 12  # of a step's square: such noise, and what rounding adds
@@ -77,7 +77,7 @@ class HiddenNoise:
         return self.all or process in FASTEST
 
 
-class Steps:
+class StepAndRange:
     """Step and range of the values so far. Add blocks in order, then call `hidden`."""
 
     def __init__(self) -> None:
@@ -93,7 +93,7 @@ class Steps:
         self._low, self._high = min(self._low, float(samples.min())), max(self._high, float(samples.max()))
         self._last = float(samples[-1])
 
-    def hidden(self, curve: Curve, rate_hz: float, corner_hz: float) -> HiddenNoise | None:
+    def hidden(self, curve: DeviationCurve, rate_hz: float, corner_hz: float) -> HiddenNoise | None:
         """Noise below the converter's step, from Allan deviations behind a first-order low-pass; None if not hidden."""
         limit = LEAST * self._step**2
         if not np.isfinite(self._step) or _variance_at_converter(curve, rate_hz, corner_hz) >= limit:
@@ -110,7 +110,7 @@ def hidden_step(values: Array) -> float | None:
     return step if np.isfinite(step) and np.mean(differences**2) / 2 < LEAST * step**2 else None
 
 
-def _variance_at_converter(curve: Curve, rate_hz: float, corner_hz: float) -> float:
+def _variance_at_converter(curve: DeviationCurve, rate_hz: float, corner_hz: float) -> float:
     """The variance of noise, as it reaches the converter within some samples, or behind its low-pass."""
     variance = curve.deviation**2
     short_term = float(np.max(variance[curve.tau_s <= SOON / rate_hz]))

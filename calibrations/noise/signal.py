@@ -20,7 +20,7 @@ from calibrations.fitting.fit import fit as fit_rows
 from calibrations.free_forms.place_names import place_of_effect
 from calibrations.means.noise import neighbour_std, with_white
 from calibrations.model import Estimate, Model, Term
-from calibrations.noise.deviations import Curve, octaves
+from calibrations.noise.deviations import DeviationCurve, octaves
 from calibrations.noise.record import Channel, Still
 from calibrations.table import AXES, Array, Table
 
@@ -242,10 +242,12 @@ def with_cleaned_curves(still: Still, axes: set[str]) -> Still:
     return replace(still, allan={**still.allan, **curves})
 
 
-def _clean_curve(curve: Curve, channel: Channel) -> Curve:
+def _clean_curve(curve: DeviationCurve, channel: Channel) -> DeviationCurve:
     """The curve of a channel whose means have changed."""
     slow = octaves([channel.means], 1 / channel.sampling.interval_s)
     fast = np.arange(len(curve.tau_s)) < len(curve.tau_s) - len(slow.tau_s)
     parts = ((getattr(curve, name)[fast], getattr(slow, name)) for name in ("tau_s", "deviation", "low", "high", "edf"))
     tau_s, deviation, low, high, edf = map(np.concatenate, parts)
-    return Curve(curve.kind, tau_s, deviation, low, high, (*np.array(curve.alpha)[fast].tolist(), *slow.alpha), edf)
+    return DeviationCurve(
+        curve.kind, tau_s, deviation, low, high, (*np.array(curve.alpha)[fast].tolist(), *slow.alpha), edf
+    )

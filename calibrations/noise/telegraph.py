@@ -53,7 +53,7 @@ Path = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Level:
+class TelegraphLevel:
     """One level: its height above the lowest, its share of the time, and the mean time at it, s."""
 
     height: float
@@ -70,7 +70,7 @@ class Telegraph:
 
     axis: str
     unit: str
-    levels: tuple[Level, ...]
+    levels: tuple[TelegraphLevel, ...]
     jumps: int
     traps: tuple[float, ...] = ()
 
@@ -160,7 +160,7 @@ def _telegraph(channel: Channel, values: Array, path: Path) -> Telegraph:
     found = zip(heights.tolist(), (counts / len(path)).tolist(), dwells_s.tolist(), strict=True)
     stds = np.std(values - _along(values, path, channel.size)) / np.sqrt(counts)
     traps = _two_traps(heights, stds, path)
-    return Telegraph(channel.axis, channel.unit, tuple(Level(*each) for each in found), len(jumps), traps)
+    return Telegraph(channel.axis, channel.unit, tuple(TelegraphLevel(*each) for each in found), len(jumps), traps)
 
 
 def _two_traps(heights: Array, stds: Array, path: Path) -> tuple[float, ...]:

@@ -53,7 +53,7 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Reading:
+class LevelReading:
     """Inclination of the level's axes, in deg, positive where the axis' positive end is up.
 
     `std_deg` is the standard deviation of either mean, of `n` readings: from their scatter, and never less than that
@@ -91,7 +91,7 @@ class Level:
         angles = f"x {reading.x_deg:+.3f}, y {reading.y_deg:+.3f} deg"
         return [Check("reading", True, f"{angles}, standard deviation {reading.std_deg:.4f} deg")]
 
-    def read(self) -> Reading:
+    def read(self) -> LevelReading:
         """The mean of `settings.readings` readings, once they agree.
 
         Raises:
@@ -106,10 +106,10 @@ class Level:
             readings.append(self._read_once())
         return self._mean(readings[-self.settings.readings :])
 
-    def _mean(self, readings: list[tuple[float, float]]) -> Reading:
+    def _mean(self, readings: list[tuple[float, float]]) -> LevelReading:
         x_deg, y_deg = np.mean(readings, axis=0)
         std_deg = max(_std_deg(readings) / math.sqrt(len(readings)), RESOLUTION_DEG / math.sqrt(12))
-        return Reading(float(x_deg), float(y_deg), std_deg, len(readings), self.settings.accuracy_deg)
+        return LevelReading(float(x_deg), float(y_deg), std_deg, len(readings), self.settings.accuracy_deg)
 
     def _has_settled(self, readings: list[tuple[float, float]], deadline: float) -> bool:
         """Whether the last readings agree. Raises NotSettled after the patience, InstrumentError for equal readings."""

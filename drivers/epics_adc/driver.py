@@ -21,7 +21,7 @@ from drivers.errors import LimitError, SensorFault, StreamError
 from drivers.instrument import Check, Identity, require_positive
 from drivers.recorder import Inputs, NoDigitalLines, Recorder, Samples
 from drivers.transport import Address, Links
-from drivers.transport.channel_access import Reading, Records
+from drivers.transport.channel_access import FieldReading, Records
 
 __all__ = ["AnalogRecords", "Settings", "connect"]
 
@@ -93,7 +93,7 @@ class AnalogRecords(Recorder[Settings]):
             self._require_fresh(fresh, last)
             yield Samples(volts, channels, rate_hz, start_s + first / rate_hz)
 
-    def _scan(self) -> dict[str, Reading]:
+    def _scan(self) -> dict[str, FieldReading]:
         """One reading of every channel."""
         channels = self.settings.channels
         return dict(zip(channels, self._records.read(*channels.values()), strict=True))
@@ -114,7 +114,7 @@ class AnalogRecords(Recorder[Settings]):
         fresh.note(readings, self._clock.now())
         return np.array([reading.value * self._volts[channel] for channel, reading in readings.items()])
 
-    def _require_sound(self, channel: str, reading: Reading) -> None:
+    def _require_sound(self, channel: str, reading: FieldReading) -> None:
         context = f"{self.name}: {channel} ({self._records.beginning}{self.settings.channels[channel]})"
         if reading.is_worse_than(self.settings.highest_severity):
             raise SensorFault(
@@ -175,7 +175,7 @@ class Freshness:
         self._repeated = dict.fromkeys(channels, 0)
         self.stopped = ""
 
-    def note(self, readings: Mapping[str, Reading], now_s: float) -> None:
+    def note(self, readings: Mapping[str, FieldReading], now_s: float) -> None:
         """Count the readings whose time stamp is that of the reading before."""
         for channel, reading in readings.items():
             stamp = self._stamps.get(channel)

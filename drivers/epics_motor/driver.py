@@ -18,7 +18,7 @@ from drivers.errors import Interlocked, LimitError, NotSettled, StageAlarm, Stag
 from drivers.instrument import Check, Identity
 from drivers.motor_stage import LEAD_S, MotorStage, Turn
 from drivers.transport import Address, Links
-from drivers.transport.channel_access import Reading, Records
+from drivers.transport.channel_access import FieldReading, Records
 
 __all__ = ["MotorRecord", "Settings", "connect"]
 
@@ -168,7 +168,7 @@ class MotorRecord(MotorStage):
         at_s, at_deg = self._clock.now(), start_deg + rate_deg_s * (ramp_s / 2 + LEAD_S)
         return Turn(rate_deg_s, WATCH_S, lambda: self._require_turning(rate_deg_s, at_deg, at_s))
 
-    def _set(self, state: Mapping[str, Reading], field: str, value: float) -> None:
+    def _set(self, state: Mapping[str, FieldReading], field: str, value: float) -> None:
         """Write a field if its value differs, and read it back, because the record has its own limits."""
         if math.isclose(state[field].value, value, rel_tol=CLOSE):
             return
@@ -178,7 +178,7 @@ class MotorRecord(MotorStage):
                 "Compare speed_deg_s and acceleration_deg_s2 in the bench file with the record's VBAS and VMAX",
             )
 
-    def _wait_until_done(self, timeout_s: float, failure: str) -> dict[str, Reading]:
+    def _wait_until_done(self, timeout_s: float, failure: str) -> dict[str, FieldReading]:
         """Wait until DMOV is 1, and return the state. Raises StageAlarm; NotSettled after the time."""
         deadline = self._clock.now() + timeout_s
         while not (state := self._read(*STATE))[mr.DONE].value:
@@ -191,33 +191,33 @@ class MotorRecord(MotorStage):
             self._clock.sleep(POLL_S)
         return state
 
-    def _read(self, *names: str) -> dict[str, Reading]:
+    def _read(self, *names: str) -> dict[str, FieldReading]:
         return dict(zip(names, self._records.read(*names), strict=True))
 
-    def _angle_deg(self, state: Mapping[str, Reading]) -> float:
+    def _angle_deg(self, state: Mapping[str, FieldReading]) -> float:
         return state[mr.READBACK].value * self._deg
 
-    def _record_limits_deg(self, state: Mapping[str, Reading]) -> tuple[float, float]:
+    def _record_limits_deg(self, state: Mapping[str, FieldReading]) -> tuple[float, float]:
         """The record's limits; none where both are equal."""
         low, high = sorted(state[limit].value * self._deg for limit in (mr.LOW_LIMIT, mr.HIGH_LIMIT))
         return (low, high) if low < high else (-math.inf, math.inf)
 
-    def _is_at_target(self, state: Mapping[str, Reading]) -> bool:
+    def _is_at_target(self, state: Mapping[str, FieldReading]) -> bool:
         settled = abs(self._angle_deg(state) - self._target_deg) <= self.settings.settle_deg
         return bool(state[mr.DONE].value) and settled
 
-    def _require_at_target(self, state: Mapping[str, Reading], remedy: str) -> None:
+    def _require_at_target(self, state: Mapping[str, FieldReading], remedy: str) -> None:
         """Raises NotSettled where the readback is not at the target of the last move."""
         if self._is_at_target(state):
             return
         cause = " (its own limits have stopped it, LVIO)" if self._records.read(mr.LIMIT_VIOLATION)[0].value else ""
         raise self._away_from_target(self._angle_deg(state), remedy, cause)
 
-    def _require_movable(self, state: Mapping[str, Reading]) -> None:
+    def _require_movable(self, state: Mapping[str, FieldReading]) -> None:
         self._require_no_alarm(state)
         self._require_mode(state)
 
-    def _require_mode(self, state: Mapping[str, Reading]) -> None:
+    def _require_mode(self, state: Mapping[str, FieldReading]) -> None:
         """Raises Interlocked for a record that does not move its motor."""
         if (mode := int(state[mr.MODE].value)) != mr.GO:
             raise Interlocked(
@@ -230,7 +230,7 @@ class MotorRecord(MotorStage):
                 "Set it to Use, then resume the run",
             )
 
-    def _require_no_alarm(self, state: Mapping[str, Reading]) -> None:
+    def _require_no_alarm(self, state: Mapping[str, FieldReading]) -> None:
         """Raises StageAlarm for an alarm of the record, or a fault in its status word."""
         status = int(state[mr.STATUS].value)
         for mask, (fault, remedy) in mr.FAULTY.items():

@@ -152,7 +152,7 @@ class LineSensor(DigitalSensor[Settings, LineDecoder]):
                 "Correct format and columns in the sensor's settings",
             )
         return BadFrame(
-            f"{self.name}: what comes on {self._link.url} is not text ({assembly.unread[:16]!r})",
+            f"{self.name}: received bytes on {self._link.url} that are not text ({assembly.unread[:16]!r})",
             "The baud rate is probably wrong: write the sensor's, as serial:/dev/ttyUSB0?baud=115200",
         )
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from drivers.errors import DriverError, Interlocked, LimitError, OverRange, Refused, StreamError
 from drivers.instrument import Check, Identity
 from drivers.labjack_t7 import registers as t7
-from drivers.labjack_t7.stream import Calibration, Reception
+from drivers.labjack_t7.stream import RangeCalibration, Reception
 from drivers.recorder import Inputs, Recorder, Samples
 from drivers.transport import Address, Links
 from drivers.transport.link import Link
@@ -209,10 +209,10 @@ class T7(Recorder[Settings]):
             self._unit.write(t7.ain_range(number), self.settings.range_v)
             self._unit.write(t7.ain_negative(number), t7.SINGLE_ENDED)
 
-    def _read_calibration(self) -> Calibration:
+    def _read_calibration(self) -> RangeCalibration:
         self._unit.write(t7.FLASH_POINTER, t7.CALIBRATION_ADDRESS)
         words = self._unit.read_words(t7.FLASH, t7.CALIBRATION_WORDS, "the calibration in flash")
-        calibration = Calibration.from_flash(words, self.settings.range_v)
+        calibration = RangeCalibration.from_flash(words, self.settings.range_v)
         if not calibration.plausible:
             raise StreamError(f"{self.name}: its calibration is {calibration}", "Have the device calibrated")
         return calibration

@@ -106,7 +106,7 @@ class Packets:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class RangeCalibration:
     """One range of the converter: slopes in V per code above and below the center."""
 
     positive_slope: float
@@ -115,7 +115,7 @@ class Calibration:
     offset: float
 
     @classmethod
-    def from_flash(cls, words: Sequence[int], range_v: float) -> Calibration:
+    def from_flash(cls, words: Sequence[int], range_v: float) -> RangeCalibration:
         """Calibration of the fast converter, from words of the flash memory."""
         constants = struct.unpack(f">{len(words) // 2}f", struct.pack(f">{len(words)}H", *words))
         first = 4 * RANGES_V.index(range_v)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from drivers.labjack_t7 import registers as t7
 from drivers.labjack_t7.driver import Settings
 from drivers.labjack_t7.registers import HIGHEST_CODE
-from drivers.labjack_t7.stream import BUFFER_FULL, FUNCTION, KIND, RECOVERED, UNIT, Calibration, packet_type
+from drivers.labjack_t7.stream import BUFFER_FULL, FUNCTION, KIND, RECOVERED, UNIT, RangeCalibration, packet_type
 from drivers.transport.address import Address
 from drivers.transport.faults import Faults, Kind
 from drivers.transport.modbus import Register
@@ -107,7 +107,7 @@ class Inputs:
         self, numbers: Sequence[int], ranges_v: Sequence[float], start_s: float, interval_s: float, n: int
     ) -> NDArray[np.uint16]:
         """Codes of `n` scans, shape (n, inputs). An open input reads 0 V."""
-        constants = [Calibration.from_flash(FLASH_WORDS, range_v) for range_v in ranges_v]
+        constants = [RangeCalibration.from_flash(FLASH_WORDS, range_v) for range_v in ranges_v]
         return codes_of_volts(self._volts(numbers, start_s, interval_s, n), constants)
 
     def _volts(self, numbers: Sequence[int], start_s: float, interval_s: float, n: int) -> NDArray[np.float64]:
@@ -121,7 +121,7 @@ class Inputs:
         return volts
 
 
-def codes_of_volts(volts: NDArray[np.float64], ranges: Sequence[Calibration]) -> NDArray[np.uint16]:
+def codes_of_volts(volts: NDArray[np.float64], ranges: Sequence[RangeCalibration]) -> NDArray[np.uint16]:
     """The converter: nearest code of each column, clipped at the ends of its range."""
     constants = np.array([(c.positive_slope, c.negative_slope, c.center) for c in ranges])
     codes = np.empty(volts.shape, np.uint16)
@@ -286,7 +286,7 @@ class Converter(Twin):
         for number in range(address // 2, (address + count) // 2):
             range_v = self._range_v(number)
             code = self._inputs.codes([number], [range_v], now_s, 0.0, 1)[0, 0]
-            words += t7.ain(number).encode(Calibration.from_flash(FLASH_WORDS, range_v).table()[code])
+            words += t7.ain(number).encode(RangeCalibration.from_flash(FLASH_WORDS, range_v).table()[code])
         return words
 
     def _read_flash(self, count: int) -> Sequence[int]:

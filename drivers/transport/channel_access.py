@@ -18,7 +18,7 @@ from typing import Any
 from drivers.errors import BadFrame, DriverError, LinkRefused, LinkTimeout, Refused
 from drivers.transport.link import Link
 
-__all__ = ["SEVERITIES", "Circuit", "Reading", "Records", "channel_access", "find_server"]
+__all__ = ["SEVERITIES", "Circuit", "FieldReading", "Records", "channel_access", "find_server"]
 
 NO_CAPROTO = "Install it: pip install 'inertial-rig[labs]'"
 SEVERITIES = ("none", "minor", "major", "invalid")
@@ -42,7 +42,7 @@ def channel_access(context: str) -> Any:
 
 
 @dataclass(frozen=True)
-class Reading:
+class FieldReading:
     """The value of a field, with the alarm and the time stamp of its record (s since 1970, of the IOC's clock)."""
 
     value: float
@@ -90,7 +90,7 @@ class Circuit:
             self._receive_until(complete, missing[0], device, timeout_s)
             self._channels |= channels
 
-    def read(self, names: Sequence[str], device: str, timeout_s: float) -> list[Reading]:
+    def read(self, names: Sequence[str], device: str, timeout_s: float) -> list[FieldReading]:
         """The values of these fields, requested together. Raises LinkTimeout, LinkRefused, Refused, BadFrame."""
         kind = self._ca.ChannelType.TIME_DOUBLE
         return [self._decode(_reading, answer, device) for answer in self._request(names, kind, device, timeout_s)]
@@ -216,7 +216,7 @@ class Records:
         self.beginning = beginning
         self._circuit, self._device, self._timeout_s = circuit, device, timeout_s
 
-    def read(self, *fields: str) -> list[Reading]:
+    def read(self, *fields: str) -> list[FieldReading]:
         """The values of fields, requested together. Raises LinkTimeout, LinkRefused, Refused, BadFrame."""
         return self._circuit.read([self.beginning + field for field in fields], self._device, self._timeout_s)
 
@@ -283,9 +283,9 @@ def _find_answer(udp: socket.socket, broadcaster: Any, number: int, deadline: fl
     return None
 
 
-def _reading(answer: Any) -> Reading:
+def _reading(answer: Any) -> FieldReading:
     alarm = answer.metadata
-    return Reading(float(answer.data[0]), int(alarm.severity), int(alarm.status), float(alarm.timestamp))
+    return FieldReading(float(answer.data[0]), int(alarm.severity), int(alarm.status), float(alarm.timestamp))
 
 
 def _units(answer: Any) -> str:

@@ -18,7 +18,7 @@ from drivers.world.converter import Converter
 from drivers.world.displacement_sensor import FibreProbe
 from drivers.world.disturbances import Oddities, Supply
 from drivers.world.errors import BadSetting, UnknownSetting
-from drivers.world.gravity import Base, Level, Package, Seating
+from drivers.world.gravity import Base, LevelErrors, Package, Seating
 from drivers.world.heat import Heat, Oven
 from drivers.world.laboratory import Laboratory
 from drivers.world.noise import Noises
@@ -88,7 +88,7 @@ class WorldConfig:
     noise: Noises = field(default_factory=Noises)
     floor: Floor = field(default_factory=Floor)
     converter: Converter = field(default_factory=Converter)
-    level: Level = field(default_factory=Level)
+    level: LevelErrors = field(default_factory=LevelErrors)
     positioner: Positioner = field(default_factory=Positioner)
     d63: FibreProbe = field(default_factory=FibreProbe)
     oddities: Oddities = field(default_factory=Oddities)

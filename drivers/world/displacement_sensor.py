@@ -66,7 +66,7 @@ def measure_curve(probe: FibreProbe, random: np.random.Generator) -> tuple[Float
 
 
 def certificate(probe: FibreProbe, seed: int = 63) -> str:
-    """The curve as a YAML document that `philtec_d63.Curve` reads."""
+    """The curve as a YAML document that `philtec_d63.CalibrationCurve` reads."""
     gaps, volts = measure_curve(probe, np.random.Generator(np.random.PCG64(seed)))
     highest = int(np.argmax(volts))
     used = (volts > FOOT_SHARE * volts[highest]) & (volts < PEAK_SHARE * volts[highest])

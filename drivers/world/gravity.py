@@ -95,7 +95,7 @@ PLATE_AXES = np.eye(3)
 
 
 @dataclass(frozen=True)
-class Level:
+class LevelErrors:
     """Errors of the level itself."""
 
     offset_x_deg: float = 0.0  # its reading on a level plate
@@ -109,7 +109,7 @@ def inclination_deg(up: Floats, alpha_rad: float, beta_rad: float) -> tuple[floa
     return math.degrees(math.atan2(x, z)), math.degrees(math.atan2(y, z))
 
 
-def shown_deg(level: Level, inclined_deg: tuple[float, float], seed: int, t_ns: int) -> tuple[float, float]:
+def shown_deg(level: LevelErrors, inclined_deg: tuple[float, float], seed: int, t_ns: int) -> tuple[float, float]:
     """The reading of the level. Its noise depends on seed and time only, so a reading disturbs nothing."""
     noise = level.noise_deg * np.random.default_rng([seed, 3, t_ns]).standard_normal(2)
     x, y = inclined_deg

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from calibrations.errors import DataError
 from calibrations.files import read_mapping
 from calibrations.geometry.error_table import ErrorTable, Point, read_error_table
-from drivers.philtec_d63 import Curve
+from drivers.philtec_d63 import CalibrationCurve
 from rig.bench.bench import Bench
 from rig.bench.check import check, check_values, describe_error
 from rig.bench.parts import SIMULATED, TURNING, Folders, Instrument
@@ -71,7 +71,7 @@ def _with_curve(entry: Any, path: Path) -> dict[str, Any]:
     file = own_file(path, Path(name), f"{path}, key d63.curve")
     document = read_mapping(file, "curve", lambda text: BenchError(f"{path}, key d63.curve: {text}"), CURVE)
     try:
-        curve = Curve.from_mapping(document)
+        curve = CalibrationCurve.from_mapping(document)
     except ValueError as error:
         raise BenchError(f"{path}, key d63.curve: {file}: {error}") from None
     return {"d63": {**entry, "curve": dataclasses.asdict(curve)}}

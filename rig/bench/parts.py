@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator
 
 from calibrations.geometry.error_table import Point
 from drivers.philtec_d63 import SIMULATED as SIMULATED_CURVE
-from drivers.philtec_d63 import Curve
+from drivers.philtec_d63 import CalibrationCurve
 from drivers.transport.address import Address
 from drivers.transport.faults import Fault
 
@@ -88,7 +88,7 @@ class Sensor(Strict):
     filter_corner_hz: float | None = None
     latitude_deg: float | None = Field(
         default=None, ge=-90, le=90
-    )  # of the laboratory: a gyroscope feels the earth turn
+    )  # of the laboratory: a gyroscope measures the earth's rotation
     height_m: float | None = Field(default=None, ge=-500, le=9000)  # of the laboratory above the sea
     heading_deg: float | None = Field(default=None, ge=-360, le=360)  # of the base's x axis, clockwise from true north
     world: dict[str, Any] = {}
@@ -144,7 +144,7 @@ class Displacement(Strict):
     `curve` is a YAML file in the folder of the bench file, `simulated`, or the curve. `read_bench` gives the curve.
     """
 
-    curve: Curve
+    curve: CalibrationCurve
     side: Literal["near", "far"] = "near"
     direction: Literal[1, -1] = 1
 
@@ -155,9 +155,9 @@ class Displacement(Strict):
 
 
 @cache
-def _simulated_curve() -> Curve:
+def _simulated_curve() -> CalibrationCurve:
     """The curve of the simulated sensor, which every simulated bench has."""
-    return Curve.from_file(SIMULATED_CURVE)
+    return CalibrationCurve.from_file(SIMULATED_CURVE)
 
 
 class Folders(Strict):

@@ -165,9 +165,9 @@ RESULTS: Mapping[str, Mapping[str, str]] = {  # name -> meaning, by procedure
     "temperature-cycle": _names_of_axes(
         {
             "bias-temperature-{axis}": "Change of the bias for each kelvin.",
-            "bias-temperature-hysteresis-{axis}": "Bias on the way up less bias on the way down in temperature.",
+            "bias-temperature-hysteresis-{axis}": "Bias at rising temperature minus bias at falling temperature.",
             "scale-temperature-{axis}": "Relative change of the scale factor for each kelvin.",
-            "scale-temperature-hysteresis-{axis}": "Relative difference of the scale factor, way up less way down.",
+            "scale-temperature-hysteresis-{axis}": "Relative difference of the scale factor, rising minus falling.",
         }
     ),
 }

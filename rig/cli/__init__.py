@@ -22,7 +22,7 @@ from rig.files import choose_kernel_cache
 
 SECTIONS: Mapping[str, Mapping[str, tuple[str, str]]] = {  # of `rig --help`: command -> its module, its line
     "Start": {
-        "demo": ("demo", "find three hidden faults of a simulated sensor, and compare them with what was hidden"),
+        "demo": ("demo", "find three hidden faults of a simulated sensor, and compare them with the true ones"),
         "web": ("web", "the workbench in a browser: models, runs, record and comparison"),
     },
     "Measure": {
@@ -106,7 +106,7 @@ class Commands(click.Group):
                 formatter.write_dl([(name.ljust(width), summary) for name, (_, summary) in section.items()])
 
 
-NEW_OBJECTS = 50_000  # between two collections of garbage: imports make many objects, and none of them is garbage
+NEW_OBJECTS = 50_000  # objects between two garbage collections: imports make many objects, and none of them is garbage
 COMPLETE = "_RIG_COMPLETE"  # set by the completion script of a shell
 
 

@@ -16,7 +16,7 @@ Vectors = NDArray[np.float64]
 class Attitude:
     """Angles in deg; `flip` is 1 for face down; `shaken` where the nano-positioner is between table and sensor.
 
-    Lab frame: x to the right, y away from who looks, z upward.
+    Lab frame: x to the right, y away from the viewer, z upward.
     """
 
     alpha_deg: float = 0.0

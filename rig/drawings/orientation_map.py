@@ -49,7 +49,7 @@ CUBE, CUBE_PX = (150, 180), 50.0
 ARROW_START = (78, 62)  # of the cube: where the arrow to the north begins
 DISCS = (((430, 164), 1, "+z half"), ((680, 164), -1, "-z half"))
 DISC_PX = 88.0
-VIEW = np.array([0.5, -0.7, 0.6])  # from the sensor to who looks at it; z is upward
+VIEW = np.array([0.5, -0.7, 0.6])  # from the sensor to the viewer; z is upward
 SIDES = {"x": "#f6d5c6", "y": "#c6e5d9", "z": "#c9dff0"}
 
 

@@ -91,7 +91,7 @@ def mark_angle(
         yield svg.line(points, svg.ORANGE, 1.8) + svg.head(points[-1], direction, svg.ORANGE)
 
 
-# What a still sensor feels along each of its axes, as bars from -1 g to +1 g.
+# The specific force along each axis of a still sensor, as bars from -1 g to +1 g.
 
 ROW_PX, NAME_PX, VALUE_PX = 22, 24, 74
 
@@ -165,7 +165,7 @@ def table_view(attitude: Attitude, centre: tuple[float, float], radius: float) -
 
 
 def _sensor(attitude: Attitude, radius: float) -> Iterator[str]:
-    """Board and package with x to the right, about the origin; of one that lies face down the back is seen."""
+    """Board and package with x to the right, about the origin; face down, the back is visible."""
     b, p = BOARD_HALF * radius, PACKAGE_HALF * radius
     if attitude.shaken:
         yield svg.polygon(_square(1.3 * b), "#c3ccd5", "#8b98a6", 1.2)

@@ -10,7 +10,7 @@ import numpy as np
 from rig.drawings import svg
 from rig.drawings.attitude import Attitude, Vectors
 
-# Convex solids seen from far away: their faces that look this way, shaded, in the order in which they are painted.
+# Convex solids without perspective: the visible faces, shaded, in the order of drawing.
 
 LIGHT = np.array([-0.45, -0.55, 0.70])
 AMBIENT = 0.62  # of the brightness, on a face that the light does not meet
@@ -19,7 +19,7 @@ ROUND = 48  # faces of a cylinder
 
 @dataclass(frozen=True)
 class Camera:
-    """Looks at the middle of the lab from `direction`; `scale` px for one unit, the middle at `centre`."""
+    """The view of the middle of the lab from `direction`; `scale` px for one unit, the middle at `centre`."""
 
     direction: tuple[float, float, float]
     scale: float
@@ -47,7 +47,7 @@ class Solid:
     colour: str
 
     def drawn(self, camera: Camera) -> Iterator[str]:
-        """The faces that can be seen; of a convex solid they do not cover each other."""
+        """The visible faces; those of a convex solid do not overlap."""
         for face in self.faces:
             normal = np.cross(face[1] - face[0], face[2] - face[1])
             normal /= np.linalg.norm(normal)

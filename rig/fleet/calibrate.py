@@ -74,14 +74,14 @@ class CalibratedBatch:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class FleetCalibration:
     """All batches, and the faults of the sensors that are in no batch."""
 
     batches: tuple[CalibratedBatch, ...]
     faults: Mapping[Member, str]
 
 
-def calibrate_fleet(fleet: Fleet, members: Sequence[Member], guide: Guide) -> Calibration:
+def calibrate_fleet(fleet: Fleet, members: Sequence[Member], guide: Guide) -> FleetCalibration:
     """Fit all sensors, and pool those of a batch that have the same parameters."""
     faults = {member: member.fault for member in members if member.fault}
     screenings: dict[Member, Screening] = {}
@@ -98,7 +98,7 @@ def calibrate_fleet(fleet: Fleet, members: Sequence[Member], guide: Guide) -> Ca
     batches = (
         _batch(batch, names, batch_members, screenings, guide) for (batch, names), batch_members in groups.items()
     )
-    return Calibration(tuple(batches), faults)
+    return FleetCalibration(tuple(batches), faults)
 
 
 def _batch(
@@ -155,7 +155,7 @@ def write_guide(population: Population, start: Question, folder: Path) -> list[P
     return [folder / name for name in texts]
 
 
-def write_models(result: Calibration, folder: Path) -> list[Path]:
+def write_models(result: FleetCalibration, folder: Path) -> list[Path]:
     """Write a model file for each sensor; return the paths. Raises OutputError."""
     make_folder(folder)
     texts = {safe(sensor): dump_model(model) for batch in result.batches for sensor, model in models(batch).items()}

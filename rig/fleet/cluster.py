@@ -21,11 +21,11 @@ from rig.runs.signals import stoppable
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
 
-AHEAD = 3  # chunks on their way for each thread of a worker
+AHEAD = 3  # chunks in transit for each thread of a worker
 PATIENCE_S = 10  # for a scheduler to answer
 FEW = 10  # messages that Dask keeps of each connection: they hold the tables that were sent, and memory would grow
 
-NOT_STARTED = "the workers did not start ({}); free memory, or ask for fewer --workers"
+NOT_STARTED = "the workers did not start ({}); free memory, or give a smaller --workers"
 LOST = "the connection to the scheduler is lost; finished work is in the record: run the same command again"
 
 T = TypeVar("T")
@@ -69,10 +69,10 @@ def connect_workers(scheduler: str | None, workers: int | None) -> Iterator[Clie
 
 
 def start_cluster(workers: int | None) -> LocalCluster:
-    """A local cluster whose processes do not hear Ctrl-C and the end of a terminal: the command alone handles these.
+    """A local cluster whose processes ignore Ctrl-C and the end of a terminal: only the command handles these.
 
-    A cluster that has half started cannot be closed, so `stoppable` lets a signal wait for the end of this function.
-    Raises FleetError if a worker ends before it has started.
+    A cluster cannot be closed during its start, so `stoppable` lets a signal wait for the end of this function. Raises
+    FleetError if a worker ends before it has started.
     """
     from distributed import LocalCluster
 

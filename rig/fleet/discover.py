@@ -44,7 +44,7 @@ Batches = Mapping[str, Sequence[Member]]
 
 @dataclass(frozen=True)
 class ScreeningSummary:
-    """The part of a screening that is kept, see Screening. `on_stages`: whether stages turned the sensor."""
+    """The part of a screening that stays in memory, see Screening. `on_stages`: whether stages turned the sensor."""
 
     excess: float
     free: int

@@ -14,7 +14,7 @@ from calibrations.presentation.document import Section, Table
 from calibrations.presentation.report.fleet import calibration_report, population_report
 from calibrations.text import estimate_text, rounded
 from rig.files import program
-from rig.fleet.calibrate import CalibratedBatch, Calibration
+from rig.fleet.calibrate import CalibratedBatch, FleetCalibration
 from rig.fleet.worker import effects_of
 from rig.services.provenance import today
 
@@ -53,7 +53,7 @@ def population_document(population: Population, model: str) -> Document:
     }
 
 
-def calibration_document(calibration: Calibration, model: str) -> Document:
+def calibration_document(calibration: FleetCalibration, model: str) -> Document:
     """The document of `rig fleet calibrate`."""
     return {
         "schema": SCHEMA,
@@ -122,7 +122,7 @@ def population_page(population: Population, model: str) -> str:
     return population_report(population, model, _facts(model))
 
 
-def calibration_page(calibration: Calibration, model: str) -> str:
+def calibration_page(calibration: FleetCalibration, model: str) -> str:
     """The HTML page of `rig fleet calibrate`."""
     quantities: dict[str, list[Spread]] = {}
     for batch in calibration.batches:

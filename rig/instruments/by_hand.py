@@ -30,9 +30,9 @@ class HandAnalysis:
         return judge_window(windows, cast(Any, noise))
 
     def course(self, dwells: Sequence[Dwell], noise: NoiseAtRest, skipped: Sequence[str] = ()) -> HandCourse:
-        """The positions so far; orientations with the words `skipped` are not wanted.
+        """The positions so far; orientations with the words `skipped` are not requested again.
 
-        The path of a pose has the orientation that was wanted, in words.
+        The path of a pose has the requested orientation, in words.
         """
         from calibrations.analyses.hand_positions import OUTPUTS, HandPosition
         from calibrations.analyses.hand_positions import HandCourse as Course
@@ -47,7 +47,7 @@ class HandAnalysis:
         return Course(tuple(map(position, dwells)), cast(Any, noise), unwanted)
 
     def field_course(self, dwells: Sequence[Dwell], noise: NoiseAtRest, skipped: Sequence[str] = ()) -> HandCourse:
-        """The positions of a magnetometer so far; attitudes with the words `skipped` are not wanted."""
+        """The positions of a magnetometer so far; attitudes with the words `skipped` are not requested again."""
         from calibrations.analyses.hand_fields import OUTPUTS, FieldCourse
         from calibrations.analyses.hand_positions import HandPosition
         from calibrations.design.attitudes import ATTITUDES, name_attitude
@@ -67,7 +67,7 @@ class HandAnalysis:
         return find_clipped_output(turn, rest)
 
     def turn_course(self, recorded: Sequence[RecordedPose], noise: NoiseAtRest, rest_s: float) -> HandCourse:
-        """The rests and turns so far; the path of a rest has the orientation that was wanted, in words."""
+        """The rests and turns so far; the path of a rest has the requested orientation, in words."""
         from calibrations.analyses.hand_turns import TurnCourse
 
         rests = [cast(KeptPose, each).dwell for each in recorded if not is_turn(each.pose)]

@@ -183,5 +183,5 @@ def _judged_with_dwell(design_range: Range, judged: JudgedPlan, dwell_s: float) 
 
 
 def _longer(dwell_s: float, error_ratio: float) -> float:
-    """The dwell that takes a white noise's errors down by the ratio, up to a tenth of a second."""
+    """The dwell that reduces the errors of white noise by the ratio, rounded up to a tenth of a second."""
     return float(np.ceil(10 * dwell_s * error_ratio**2 - 1e-6) / 10)

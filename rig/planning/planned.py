@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from calibrations.table import Array
-from drivers.dpg2.driver import Reading as LevelReading
+from drivers.dpg2.driver import LevelReading
 from drivers.errors import LimitError
 from drivers.instrument import OUTSIDE_ANGLE, OUTSIDE_POSITION, OUTSIDE_TEMPERATURE, require_within
 from drivers.labjack_t7.driver import Settings as AdcSettings

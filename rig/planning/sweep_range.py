@@ -168,7 +168,7 @@ class Range:
 
     @cached_property
     def _full_scale(self) -> Array:
-        """The most that a parameter does to the output within the range, V over its unit, shape (p,)."""
+        """The largest derivative of the output by each parameter within the range, V per its unit, shape (p,)."""
         return np.asarray(np.max(np.abs(self.fit.problem.jacobian(self.fit.theta)), axis=(0, 1)))
 
 

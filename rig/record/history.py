@@ -10,7 +10,7 @@ from drivers.errors import Interlocked
 from procedures.errors import Declined, NoAnswer, SafetyLimit
 from rig.errors import Stopped
 from rig.record.store import Record
-from rig.record.values import Event, Line
+from rig.record.values import Event, LogLine
 
 STOPS = (Stopped, SafetyLimit, Interlocked, NoAnswer, Declined)  # errors that stop a run; others are failures
 TURNS = ("begun", "error", "stopped", "complete")  # kinds of lines in the log
@@ -32,7 +32,7 @@ def interruptions(record: Record, run: str) -> str:
     return "; ".join(f"{turn.at[:19]}Z {turn.what} {turn.text}" for turn in turns)
 
 
-def _turns(lines: Iterable[Line]) -> list[Event]:
+def _turns(lines: Iterable[LogLine]) -> list[Event]:
     """Starts, stops and ends. A stop has its reason, and whether all instruments are at rest."""
     turns: list[Event] = []
     for line in lines:
@@ -48,7 +48,7 @@ def _turns(lines: Iterable[Line]) -> list[Event]:
     return turns
 
 
-def _stop(line: Line) -> Event:
+def _stop(line: LogLine) -> Event:
     """A stop or a failure, without the name of the error and the command that continues the run."""
     parts = ERROR.fullmatch(line.text)
     if parts is None:

@@ -134,7 +134,7 @@ poses = Table(
     "poses",
     metadata,
     Column("run", ForeignKey("runs.run"), primary_key=True),
-    Column("number", Integer, primary_key=True),  # in the order of keeping, from 0
+    Column("number", Integer, primary_key=True),  # in the order of recording, from 0
     Column("alpha_deg", Float, nullable=False),
     Column("beta_deg", Float, nullable=False),
     Column("direction", Integer, nullable=False),
@@ -143,11 +143,11 @@ poses = Table(
     Column("flip", Integer, nullable=False),
     Column("t_s", Float, nullable=False),  # middle of the dwell
     Column("temperature_c", Float),
-    Column("excluded", String),  # why a person took it out of every analysis; it stays in the record
+    Column("excluded", String),  # why a person excluded it from every analysis; it stays in the record
     Column("alpha_read_deg", Float),  # the reading of the dial of a stage that is turned by hand
     Column("beta_read_deg", Float),
     Column("up", String, nullable=False, server_default="z"),  # the edge along the table's normal
-    Column("rate_deg_s", Float, nullable=False, server_default="0"),  # of beta, in a turn that was kept
+    Column("rate_deg_s", Float, nullable=False, server_default="0"),  # of beta, in a recorded turn
     Column("checksum", BigInteger),
 )
 
@@ -198,7 +198,7 @@ columns = Table(  # of imported tables
     Column("checksum", BigInteger),
 )
 
-states = Table(  # of a simulated bench after the last kept pose: clock, world, twins
+states = Table(  # of a simulated bench after the last recorded pose: clock, world, twins
     "states",
     metadata,
     Column("run", ForeignKey("runs.run"), primary_key=True),
@@ -229,17 +229,17 @@ log = Table(  # events of a run, step by step; and messages on the wires, if req
     Index("log_of_run", "run"),
 )
 
-arrivals = Table(  # of runs that rigs push into the lab's record; those that are not whole yet are not shown
+arrivals = Table(  # of runs that rigs push into the lab's record; incomplete ones are not visible
     "arrivals",
     metadata,
     Column("uid", String, primary_key=True),  # of the run
     Column("run", ForeignKey("runs.run"), nullable=False, unique=True),  # its name here
     Column("at", String, nullable=False),  # ISO 8601, UTC
     Column("head", String),  # digest of the parts of a finished run that can change; NULL during the transfer
-    Column("digest", String),  # SHA-256 of all that is here of it, computed here when it was whole
+    Column("digest", String),  # SHA-256 of the run's rows here, computed here when they were complete
 )
 
-answers = Table(  # about one sensor of a fleet, so that the same question is not worked out again
+answers = Table(  # about one sensor of a fleet, so that the same question is not computed again
     "answers",
     metadata,
     Column("key", String, primary_key=True),  # digest of the data, the question and the program

@@ -68,7 +68,7 @@ from rig.record.schema import (
     runs,
     states,
 )
-from rig.record.values import Event, KeptPose, Line, Run
+from rig.record.values import Event, KeptPose, LogLine, Run
 
 MOST_LINES = 1000  # of the log in memory
 
@@ -222,9 +222,14 @@ class Record:
         values = {"kind": table.kind, "procedure": "import", "state": "complete", "bench": {}}
         values |= {"settings": dict(settings or {})}
         values |= {"configuration": table.digest, "constants": dict(table.constants), "source": table.source}
-        cells: Iterator[dict[str, Any]] = chain(  # one column at a time: a large table has no room for two of all
-            ({"name": name, "numbers": np.asarray(column, "<f8").tobytes()} for name, column in table.columns.items()),
-            ({"name": name, "texts": list(column)} for name, column in table.labels.items()),
+        cells: Iterator[dict[str, Any]] = (
+            chain(  # one column at a time: two copies of a large table do not fit into memory
+                (
+                    {"name": name, "numbers": np.asarray(column, "<f8").tobytes()}
+                    for name, column in table.columns.items()
+                ),
+                ({"name": name, "texts": list(column)} for name, column in table.labels.items()),
+            )
         )
         with self.engine.begin() as connection:
             run = new_run(connection, values | {"ended": timestamp()})
@@ -350,12 +355,12 @@ class Record:
         with self._reading() as connection:
             return [Event(*row) for row in connection.execute(query.order_by(events.c.event))]
 
-    def lines(self, run: str, events: Sequence[str] = ()) -> list[Line]:
+    def lines(self, run: str, events: Sequence[str] = ()) -> list[LogLine]:
         """The log of a run, in order; only the kinds in `events`, if there are any."""
         columns = [log.c[name] for name in ("at", "clock_s", "who", "what", "text")]
         is_wanted = (log.c.run == run) & (log.c.what.in_(events) if events else true())
         with self._reading() as connection:
-            return [Line(*row) for row in connection.execute(select(*columns).where(is_wanted).order_by(log.c.line))]
+            return [LogLine(*row) for row in connection.execute(select(*columns).where(is_wanted).order_by(log.c.line))]
 
     def columns(self, run: str) -> tuple[dict[str, NDArray[np.float64]], dict[str, tuple[str, ...]]]:
         """The columns of an imported table: numbers, and texts, by name."""

@@ -110,7 +110,7 @@ class KeptPose:
 
 
 @dataclass(frozen=True)
-class Line:
+class LogLine:
     """One line of a run's log: when (ISO 8601, UTC, and the rig's clock), who, what, and its text."""
 
     at: str

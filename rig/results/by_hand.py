@@ -24,8 +24,8 @@ class Target(NamedTuple):
     shown_unit: str
 
 
-# An uncertainty from a dozen positions is known to some tenths. That of the run, which decides when the positions
-# suffice, takes the noise at rest; that of the result takes the noise of each position. They differ by a tenth.
+# An uncertainty from a dozen positions has a relative error of some tenths itself. The uncertainty that ends the run
+# uses the noise at rest; that of the result uses the noise of each position. They differ by a tenth.
 MOST_OVER_TARGET = 1.2
 
 TARGET_G = Target("target_g", "g", 1e3, "mg")
@@ -46,8 +46,8 @@ def hand_positions(measured: MeasuredRun) -> dict[str, Result | Missing]:
     fit = fit_positions(measured.table())
     results = estimates(fit, "bias", "scale-factor", ANGLES)
     worst_g, parameter = largest_uncertainty_g(fit)
-    known = f"{parameter} is known to {1e3 * worst_g:.3g} mg only"
-    return results | _uncertainty(measured, worst_g, known, "positions", TARGET_G)
+    reached = f"{parameter}: standard uncertainty {1e3 * worst_g:.3g} mg"
+    return results | _uncertainty(measured, worst_g, reached, "positions", TARGET_G)
 
 
 @evaluates("hand-fields")
@@ -73,8 +73,8 @@ def hand_fields(measured: MeasuredRun) -> dict[str, Result | Missing]:
         remedy = "move away from it and repeat the run, or leave out the pose with `rig exclude`"
         return results | {"uncertainty": Missing(f"{doubt}; {remedy}")}
     worst, parameter = fields.largest_uncertainty(fit)
-    known = f"{parameter} is known to {100 * worst:.2g} % of the field only"
-    return results | _uncertainty(measured, 100 * worst, known, "positions", TARGET_PERCENT)
+    reached = f"{parameter}: standard uncertainty {100 * worst:.2g} % of the field"
+    return results | _uncertainty(measured, 100 * worst, reached, "positions", TARGET_PERCENT)
 
 
 @evaluates("hand-turns")
@@ -93,16 +93,16 @@ def hand_turns(measured: MeasuredRun) -> dict[str, Result | Missing]:
     results = gyroscope(fit)
     results |= {"turn-residual": Result(float(rms(fit.residual)[:2].max()), "deg/s")}
     worst, parameter = turns.largest_uncertainty(fit)
-    known = f"{parameter} is known to {100 * worst:.2g} % only"
-    return results | _uncertainty(measured, 100 * worst, known, "turns", TARGET_PERCENT)
+    reached = f"{parameter}: standard uncertainty {100 * worst:.2g} %"
+    return results | _uncertainty(measured, 100 * worst, reached, "turns", TARGET_PERCENT)
 
 
 def _uncertainty(
-    measured: MeasuredRun, value: float, known: str, rows: str, target: Target
+    measured: MeasuredRun, value: float, reached: str, rows: str, target: Target
 ) -> dict[str, Result | Missing]:
-    """The result `uncertainty`, in the unit of the target; Missing well above it. `known`: how well, in words."""
-    wanted = float(measured.run.settings.get(target.setting, math.inf))
-    if value <= MOST_OVER_TARGET * wanted:
+    """The result `uncertainty`, in the unit of the target; Missing well above it. `reached`: it in words."""
+    goal = float(measured.run.settings.get(target.setting, math.inf))
+    if value <= MOST_OVER_TARGET * goal:
         return {"uncertainty": Result(value, target.unit)}
-    shown = f"{target.factor * wanted:g} {target.shown_unit}"
-    return {"uncertainty": Missing(f"{known}, wanted {shown}; take more {rows}, or longer rests")}
+    shown = f"{target.factor * goal:g} {target.shown_unit}"
+    return {"uncertainty": Missing(f"{reached}, target {shown}; take more {rows}, or longer rests")}

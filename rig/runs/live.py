@@ -88,7 +88,7 @@ class Live:
     def _next_experiment(self, separating: Experiment | None, measurements: Sequence[Measurement]) -> Experiment | None:
         """The next experiment: `separating` if its poses fit the other data, else poses in between; None without time.
 
-        A short sweep comes before a much longer experiment: the room may show the same as the oven.
+        A short sweep comes before a much longer experiment: the temperature of the room may show the same as the oven.
         """
         left_s = self.time_s - measurements[-1].used_s
         intermediate = next(

@@ -36,7 +36,7 @@ NEXT_STEP = Choice("interrupted", "What should the run do next?", choices=get_ar
 @dataclass(frozen=True)
 class Outcome:
     """The end of a run: complete, stopped or failed. `error`: why it is not complete. `moving`: instruments that did
-    not stop. `retried`: a person wanted the run to continue, and this is why it could not.
+    not stop. `retried`: why the run could not continue, although a person chose this.
     """
 
     run: Run

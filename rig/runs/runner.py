@@ -139,7 +139,7 @@ def _find_unanswered_question(record: Record, run: Run, bench: Bench, procedure:
 
 
 def _after_decision(record: Record, outcome: Outcome, observer: Observer, trace: bool) -> Outcome:
-    """Continue an interrupted run as long as the observer wants it."""
+    """Continue an interrupted run as long as the observer chooses this."""
     while outcome.error is not None and (wish := _decision(outcome, observer)) != "end":
         run = outcome.run.run
         try:

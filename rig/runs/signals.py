@@ -21,7 +21,7 @@ SIGNAL_SOURCES = {
 }
 ON_A_PAGE = "stopped on a page of the workbench"  # also by SIGINT or SIGTERM, with a mark beside the status file
 COMPILED_PACKAGE = "drivers.world"  # its compiled code calls Python generators; an exception there would break it
-# Between bytes and their count: the simulated clock would wait for bytes that have come already.
+# Between the arrival of bytes and their count: the simulated clock would wait for bytes that are there already.
 COUNTERS = (("drivers.clock", "step"), ("drivers.transport.link", "put"), ("drivers.transport.link", "take"))
 # Their code discards an exception, or could not be closed after one.
 FLEET_STARTS = (("rig.fleet.cluster", "start_cluster"), ("rig.fleet.cluster", "start_client"))
@@ -52,8 +52,8 @@ def stoppable(ignored: Collection[signal.Signals] = (), inner: bool = False) -> 
     """Inside the context the first signal raises KeyboardInterrupt with its name. Later signals are ignored.
 
     `ignored` signals raise nothing. `inner`: the context lies in another one; after a SIGINT the next ones stay ignored
-    there, because a person who presses twice wants one pause. A further context hears them again. Only the main thread
-    receives signals: in another one, such as that of a page's computation, the context changes nothing.
+    there, because a person who presses twice wants one pause. A further context receives them again. Only the main
+    thread receives signals: in another one, such as that of a page's computation, the context changes nothing.
     """
     if current_thread() is not main_thread():
         yield
@@ -120,7 +120,7 @@ class _Interrupter:
     def _delay(self, number: int) -> None:
         self._delayed = number
         # No thread: the interrupted code may hold its locks. The timer repeats: a wait that begins just after one
-        # signal hears the next one.
+        # signal receives the next one.
         signal.setitimer(signal.ITIMER_REAL, AGAIN_S, AGAIN_S)
 
 

@@ -5,7 +5,8 @@ A pose with such an output is refused when it is recorded, whatever the converte
 noise    A run of equal samples that the noise of this output at rest does not explain. Each sample is equal to the one
          before with some probability. If it is below EVEN, the noise covers several steps of the resolution, and then
          it does not matter where the mean is between two steps. So n more equal samples have a probability of at most
-         the n-th power. Motion adds to the noise, so samples in motion are judged as well, but tell nothing about it.
+         the n-th power. Motion adds to the noise, so samples in motion are tested as well, but do not count for this
+         probability.
 gravity  The same constant value at poses between which the specific force along this axis changes by LEAST_G or more,
          and by half of the whole change or more. A sound output with this property is mounted more than 30 deg from its
          axis, or its step is larger than LEAST_G. This rule needs no noise: it also judges a coarse, quiet sensor.
@@ -40,7 +41,7 @@ REMEDY = (
 
 
 @dataclass
-class Steps:
+class StepCounts:
     """The steps from a sample of an output to the next one, and those without a change."""
 
     total: int = 0
@@ -103,10 +104,10 @@ class Constant:
 
 @dataclass
 class StuckOutputs:
-    """What the poses so far say about the outputs of the sensor. `kind` is that of the run."""
+    """The state of the outputs of the sensor after the poses so far. `kind` is that of the run."""
 
     kind: str = "poses"
-    _steps: dict[str, Steps] = field(default_factory=dict)  # these three by output
+    _steps: dict[str, StepCounts] = field(default_factory=dict)  # these three by output
     _equal: dict[str, EqualRun] = field(default_factory=dict)
     _constant: dict[str, Constant] = field(default_factory=dict)
 
@@ -139,7 +140,7 @@ class StuckOutputs:
         ends = np.append(np.flatnonzero(np.diff(values) != 0), len(values) - 1)  # of runs of equal samples
         counts = np.diff(ends, prepend=-1)
         first_s = samples.start_s + (ends - counts + 1) / samples.rate_hz
-        steps, earlier = self._steps.setdefault(name, Steps()), self._equal.get(name)
+        steps, earlier = self._steps.setdefault(name, StepCounts()), self._equal.get(name)
         if earlier is not None and earlier.value == values[0]:
             counts[0] += earlier.count
             first_s[0] = earlier.since_s

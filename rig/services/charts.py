@@ -111,7 +111,7 @@ def kind_label(kind: str) -> str:
     return re.sub(r"^(up|down) (-?[\d.]+) cycle$", r"\1 \2 °C", kind) or "poses"
 
 
-# Charts of the record: a run over time, a sensor's life, and two runs compared.
+# Charts of the record: a run over time, the history of a sensor, and a comparison of two runs.
 
 
 DAY_S = 86400.0
@@ -170,7 +170,7 @@ def course_chart(course: Course, name: str, time: RunTime = RunTime(), units: Ma
     return single_chart(Panel((*band, line), Axis(f"time{time.since} ({unit_s})"), Axis(f"{name} ({spelt})")))
 
 
-# A sensor's life
+# The history of a sensor
 
 
 def life_of(q: Quantity) -> Life:
@@ -210,7 +210,7 @@ def _quantity_text(q: Quantity, calibration: Calibration, signals: bool) -> str:
 
 
 def differences(pairs: Sequence[Pair]) -> Chart:
-    """The second less the first with two standard uncertainties each way, a panel for each unit.
+    """The second minus the first, with +- two standard uncertainties; a panel for each unit.
 
     Diamonds differ by more than that.
     """
@@ -254,7 +254,7 @@ def residuals(first: ChannelResidual, second: ChannelResidual, x: Column, other_
 
 
 def difference(first: ChannelResidual, repeated: RepeatedPoses) -> Chart:
-    """The second measurement less the first, at every pose that both have; the band is its noise floor."""
+    """The second measurement minus the first, at every pose that both have; the band is its noise floor."""
     c, values = first.c, first.factor * repeated.difference[first.c]
     hover = [f"{minus(f'{value:.4g}')} {first.unit}<br>{first.place(int(row))}"
              for value, row in zip(values, repeated.first, strict=True)]  # fmt: skip

@@ -4,8 +4,8 @@ A fault is a mechanism of the simulation that the bench file sets. Its size is t
 mechanism, at the same poses and without noise. The size of an effect is the rms change of the model's output without
 the effect. Bias and scale factor are free in both, because every calibration fits them.
 
-Nothing compares the name of an effect with that of a mechanism. A fault belongs to the fewest effects whose values, if
-changed, would make its curve. This data cannot separate faults that share an effect: they are one group, and
+Nothing compares the name of an effect with that of a mechanism. A fault belongs to the smallest group of effects
+whose values, if changed, give its curve. This data cannot separate faults that share an effect: they are one group, and
 its faults together must agree in curve and size with its effects together.
 """
 
@@ -40,14 +40,14 @@ STEP_STD = 0.1  # of a parameter, for the derivative of a size
 STEP = 1e-3  # of a typical value, for the derivative of a curve
 AXES = ("x", "y")
 NAMES_WIDTH = 40  # characters of names in a line of the table
-QUIET_S = 0.5  # between samples: without noise they are alike, and few are enough
+QUIET_S = 0.5  # between samples: without noise they are equal, and a few are enough
 
 
 def _paths_of_axes(part: str, *names: str) -> tuple[str, ...]:
     return tuple(f"sensor.{axis}.{part}.{name}" for axis in AXES for name in names)
 
 
-# Mechanisms by the technician's names: the settings of the world that make them.
+# Mechanisms by their names for a technician, with the settings of the simulated world.
 MECHANISMS: Mapping[str, tuple[str, ...]] = {
     "sensor soldered at an angle": tuple(f"sensor.package.turn_{axis}_deg" for axis in "xyz"),
     "sensing axes not square": ("sensor.package.beams_off_square_deg",),
@@ -58,7 +58,7 @@ MECHANISMS: Mapping[str, tuple[str, ...]] = {
     "gear play of the stages": ("stages.alpha.play_deg", "stages.beta.play_deg"),
     "wobble of the stages": ("stages.alpha.wobble_deg", "stages.beta.wobble_deg"),
     "worn worm gear": ("stages.alpha.worm_deg", "stages.beta.worm_deg"),
-    "unequal or uneven plates": _paths_of_axes(  # one reading: each of these changes what the others do
+    "unequal or uneven plates": _paths_of_axes(  # one fault: each of these changes the effect of the others
         "plates", "plate_mismatch_fraction", "overlap_loss_per_um2", "height_step_nm", "stray_fraction"
     ),
     "charge in the oxide": _paths_of_axes("plates", "charging_pm"),
@@ -69,13 +69,13 @@ MECHANISMS: Mapping[str, tuple[str, ...]] = {
     "springs soften as they warm": _paths_of_axes("springs", "stiffening_ppm_per_k"),
     "friction in the springs": _paths_of_axes("friction", "stiffness_fraction"),
     "self-heating": ("heat.board_rise_k", "heat.package_rise_k"),
-    "play between warmth and stress": ("heat.glue_play_k",),
-    "supply voltage wanders": ("supply.wander_v",),
+    "thermal play of the glue": ("heat.glue_play_k",),
+    "drift of the supply voltage": ("supply.wander_v",),
 }
 
 
 @dataclass(frozen=True)
-class Curve:
+class OutputChange:
     """A change of the output, (n, channels), free of bias and scale factor.
 
     `span`: of an effect, the change of the output by a change of its values, (n, channels, values).
@@ -98,8 +98,8 @@ class Group:
     `std`: standard uncertainty of the size of the effects together.
     """
 
-    faults: tuple[Curve, ...]
-    effects: tuple[Curve, ...] = ()
+    faults: tuple[OutputChange, ...]
+    effects: tuple[OutputChange, ...] = ()
     std: float | None = None
 
     @property
@@ -118,7 +118,7 @@ class Faults:
     """All groups of faults, the largest first. `extra`: effects that belong to no fault. Sizes in `unit`."""
 
     groups: tuple[Group, ...]
-    extra: tuple[Curve, ...]
+    extra: tuple[OutputChange, ...]
     floor: float
     unit: str
 
@@ -136,7 +136,7 @@ class Faults:
             lines.append(f"Too small to be seen, below {MATERIAL:g} noise floors: {', '.join(small)}.")
         if self.extra:
             extra = ", ".join(f"{e.name} ({self._quantity(e.size)})" for e in self.extra)
-            lines.append(f"Found, and not the curve of a hidden fault: {extra}.")
+            lines.append(f"These effects match no hidden fault: {extra}.")
         return "\n".join(lines)
 
     def document(self) -> list[dict[str, Any]]:
@@ -174,7 +174,7 @@ class Faults:
 def hidden_faults(bench: Bench, fitted: Fit, start: Fit) -> Faults:
     """The faults of a simulated bench, and the effects that only `fitted` has, not `start`.
 
-    The poses are those of the fit's table, visited once more in a world without noise. Raises what the world raises.
+    The poses are those of the fit's table, simulated once more without noise. Raises the errors of the simulated world.
     """
     config = WorldConfig.from_mapping(bench.world)
     poses = _simulate_poses(config, bench.seed, fitted.table)
@@ -189,8 +189,8 @@ def hidden_faults(bench: Bench, fitted: Fit, start: Fit) -> Faults:
 
 
 def group_steps(
-    faults: Sequence[Curve], effects: Sequence[Curve], floor: float
-) -> tuple[tuple[Group, ...], tuple[Curve, ...]]:
+    faults: Sequence[OutputChange], effects: Sequence[OutputChange], floor: float
+) -> tuple[tuple[Group, ...], tuple[OutputChange, ...]]:
     """The groups, the largest first, and the effects of none. Free forms join the effects at their place."""
     of_catalogue = [e for e in effects if e.span is not None]
     groups: list[Group] = []
@@ -203,18 +203,18 @@ def group_steps(
 
 
 def _join_fault(
-    fault: Curve, makers: Sequence[Curve], groups: Sequence[Group], effects: Sequence[Curve]
+    fault: OutputChange, makers: Sequence[OutputChange], groups: Sequence[Group], effects: Sequence[OutputChange]
 ) -> list[Group]:
-    """The groups with one fault more. It joins the groups that have one of its makers, and makes them one."""
+    """The groups with one more fault. It merges the groups that have one of its effects."""
     shared = [g for g in groups if any(e in makers for e in g.effects)]
     names = {e.name for e in makers}.union(e.name for g in shared for e in g.effects)
     joined = Group((*(f for g in shared for f in g.faults), fault), tuple(e for e in effects if e.name in names))
     return [*(g for g in groups if g not in shared), joined]
 
 
-def _makers(fault: Curve, effects: Sequence[Curve], floor: float) -> list[Curve]:
-    """The fewest effects whose values, if changed, make the curve of a fault; none where no effects do."""
-    selected: list[Curve] = []
+def _makers(fault: OutputChange, effects: Sequence[OutputChange], floor: float) -> list[OutputChange]:
+    """The smallest group of effects whose values, if changed, give the curve of a fault; empty if there is none."""
+    selected: list[OutputChange] = []
     remaining_size, unseen = fault.size, MATERIAL * floor
     while remaining_size > max(WHOLE * fault.size, unseen):
         remaining = [e for e in effects if e not in selected]
@@ -226,7 +226,7 @@ def _makers(fault: Curve, effects: Sequence[Curve], floor: float) -> list[Curve]
     return selected if remaining_size <= max(LARGEST_REST * fault.size, unseen) else []
 
 
-def _remainder_rms(fault: Curve, effects: Sequence[Curve]) -> float:
+def _remainder_rms(fault: OutputChange, effects: Sequence[OutputChange]) -> float:
     """Rms of the part of a fault's curve that the effects cannot describe."""
     spans = [e.span.reshape(fault.curve.size, -1) for e in effects if e.span is not None]
     columns_ = np.hstack(spans)
@@ -236,7 +236,7 @@ def _remainder_rms(fault: Curve, effects: Sequence[Curve]) -> float:
     return float(rms(curve - columns_ @ np.linalg.lstsq(columns_, curve, rcond=None)[0]))
 
 
-def _judge_group(group: Group, effects: Sequence[Curve]) -> list[Group]:
+def _judge_group(group: Group, effects: Sequence[OutputChange]) -> list[Group]:
     """The group with the free forms of its effects, if its effects agree with its faults; else its faults alone."""
     places = {place_of_effect(e.name) for e in group.effects}
     of_place = [e for e in effects if e.span is None and place_of_effect(e.name) in places]
@@ -247,16 +247,16 @@ def _judge_group(group: Group, effects: Sequence[Curve]) -> list[Group]:
     return [Group((fault,)) for fault in group.faults]
 
 
-def _sum_curves(curves: Sequence[Curve]) -> Curve:
-    return Curve(", ".join(c.name for c in curves), np.sum([c.curve for c in curves], axis=0))
+def _sum_curves(curves: Sequence[OutputChange]) -> OutputChange:
+    return OutputChange(", ".join(c.name for c in curves), np.sum([c.curve for c in curves], axis=0))
 
 
-def _are_alike(fault: Curve, effect: Curve) -> bool:
+def _are_alike(fault: OutputChange, effect: OutputChange) -> bool:
     same_size = effect.size < SIZE_RATIO * fault.size and fault.size < SIZE_RATIO * effect.size
     return same_size and _correlation(fault, effect) >= ALIKE
 
 
-def _correlation(a: Curve, b: Curve) -> float:
+def _correlation(a: OutputChange, b: OutputChange) -> float:
     length = float(np.linalg.norm(a.curve) * np.linalg.norm(b.curve))
     return float(np.sum(a.curve * b.curve)) / length if length > 0 else 0.0
 
@@ -284,7 +284,7 @@ def _simulate_poses(config: WorldConfig, seed: int, table: Table) -> Table:
 
 def _fault(
     name: str, settings: Sequence[str], config: WorldConfig, seed: int, table: Table, poses: Table
-) -> Curve | None:
+) -> OutputChange | None:
     """A mechanism's curve; None if the rig does not have it."""
     ideal = WorldConfig.ideal()
     changes = [(path, _value(ideal, path)) for path in settings]
@@ -293,7 +293,7 @@ def _fault(
     faultless = config
     for path, value in changes:
         faultless = faultless.changed(_nested_setting(path, value))
-    return Curve(name, _free(poses, poses.outputs - _simulate_poses(faultless, seed, table).outputs))
+    return OutputChange(name, _free(poses, poses.outputs - _simulate_poses(faultless, seed, table).outputs))
 
 
 def _value(config: Any, path: str) -> float:
@@ -307,17 +307,17 @@ def _nested_setting(path: str, value: float) -> dict[str, Any]:
     return {head: _nested_setting(tail, value) if tail else value}
 
 
-def _effect(name: str, fitted: Fit, poses: Table) -> Curve:
+def _effect(name: str, fitted: Fit, poses: Table) -> OutputChange:
     """An effect's curve in the fitted model; with its span, if it is no free form."""
     curve = _contribution([name], fitted, poses)
     if name.startswith(PREFIX):
-        return Curve(name, curve(fitted.theta))
+        return OutputChange(name, curve(fitted.theta))
     span = []
     for k in np.flatnonzero(fitted.problem.layout.of_effect(name)):
         theta = fitted.theta.copy()
         theta[k] += STEP * fitted.problem.layout.typical[k]
         span.append(curve(theta) - curve(fitted.theta))
-    return Curve(name, curve(fitted.theta), np.stack(span, axis=2))
+    return OutputChange(name, curve(fitted.theta), np.stack(span, axis=2))
 
 
 def _contribution(names: Sequence[str], fitted: Fit, poses: Table) -> Callable[[Array], Array]:
@@ -351,7 +351,7 @@ def _uncertainty(names: Sequence[str], fitted: Fit, poses: Table) -> float | Non
 
 
 def _free(poses: Table, change: Array) -> Array:
-    """The change (n, channels) without what bias and scale factor of its channel take up."""
+    """The change (n, channels) after a fit of bias and scale factor of each channel."""
     a = np.radians(poses.column("alpha_deg")), np.radians(poses.column("beta_deg"))
     loads = (np.sin(a[0]) * np.cos(a[1]), np.sin(a[0]) * np.sin(a[1]), np.cos(a[0]))
     return np.column_stack([_off_line(loads[k], change[:, k]) for k in range(change.shape[1])])

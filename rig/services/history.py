@@ -1,4 +1,4 @@
-"""The calibrations of a sensor over its life: each complete run that determines a model, in the order of time.
+"""The calibrations of a sensor in the order of time: each complete run that determines all parameters of a model.
 
 Every calibration is computed anew from its samples by the same model, so all are comparable. Its date is that of the
 run; an imported table has the constant `date` of its file (`# date: 2025-03-01`), else the day of the import.
@@ -132,7 +132,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class History:
-    """A sensor's life. `passed_over`: runs of it that are not a calibration by this model, with the reasons."""
+    """The history of a sensor. `passed_over`: its runs that are no calibration by this model, with the reasons."""
 
     sensor: str
     model: str
@@ -229,13 +229,13 @@ def closest(calibrations: Sequence[Calibration], on: date) -> tuple[Calibration,
 
 
 def stale(life: History, calibration: Calibration, age_days: float) -> str | None:
-    """Why a calibration does not hold for a day so much later (or earlier), or None."""
+    """Why a calibration is not valid for a day that is `age_days` later (below 0: earlier); None if it is valid."""
     day = calibration.at + timedelta(days=age_days)
     last = calibration is life.calibrations[-1]
     if last and life.due is not None and day.date() > life.due:
         return f"it was due on {life.due}"
     if abs(age_days) > STALE_DAYS:
-        return f"it is {abs(age_days):.0f} days {'older' if age_days > 0 else 'younger'} than that day"
+        return f"it was measured {abs(age_days):.0f} days {'before' if age_days > 0 else 'after'} that day"
     return None
 
 

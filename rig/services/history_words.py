@@ -26,10 +26,12 @@ def next_due(life: History, limit_is_given: str) -> str:
     if life.due is not None:
         names = ", ".join(q.name for q in life.quantities if q.due == life.due)
         return f"Next calibration due on {life.due}: {names} may exceed the limit then."
-    if all(q.allowed is None for q in life.quantities):
+    limited = [q for q in life.quantities if q.allowed is not None]
+    if not limited:
         return f"A due date needs a limit: {limit_is_given}, or limits.results in the bench file."
-    if all(q.line is None for q in life.quantities):
-        return next(q.no_drift for q in life.quantities if q.allowed is not None).replace("drift", "due date", 1)
+    if without_drift := [q for q in limited if q.line is None]:
+        of = "" if len(without_drift) == len(limited) else f" of {', '.join(q.name for q in without_drift)}"
+        return without_drift[0].no_drift.replace("drift", f"due date{of}", 1)
     return "With this drift no calibration is due within ten years."
 
 

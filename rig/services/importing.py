@@ -92,7 +92,7 @@ def proposal(sheet: Sheet, kind: str | None = None, mapped: Sequence[ColumnMappi
 def further_columns(sheet: Sheet, kind: str | None, mapped: Sequence[ColumnMapping]) -> list[ColumnMapping]:
     """The proposals of the page Import for the columns that neither a person nor their names in the file explain.
 
-    No outputs beside `mapped` columns: who names the outputs of one sensor leaves those of another.
+    No outputs in addition to `mapped` ones: a person who names the outputs of one sensor leaves out those of another.
     """
     named = {m.file_column for m in (*mapped, *named_columns(sheet, mapped))}
     proposed = proposal(sheet, kind, mapped).columns.values()

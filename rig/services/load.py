@@ -32,7 +32,7 @@ from rig.services.tables import BESIDE, load
 
 if TYPE_CHECKING:
     from calibrations.noise.record import Samples, Still
-    from rig.services.still import Stream
+    from rig.services.still import SampleStream
 
 Tell = Callable[[str], None]
 CHANNELS = {f"{letter}{axis}{end}" for letter in ("v", "a", "g", "m", "") for axis in "xyz" for end in ("", "_v")}
@@ -148,7 +148,7 @@ def still_of(
     return replace(still, sensed=sensed)
 
 
-def _samples(axis: str, stream: Stream, keep: dict[str, list[NDArray[Any]]] | None) -> Samples:
+def _samples(axis: str, stream: SampleStream, keep: dict[str, list[NDArray[Any]]] | None) -> Samples:
     from calibrations.noise.record import Samples
 
     blocks = stream.blocks if keep is None else _keep_blocks(stream.blocks, keep.setdefault(axis, []))
@@ -201,7 +201,7 @@ def is_noise(model: Model | None) -> bool:
 
 
 def _has_channels_alone(path: Path) -> bool:
-    """No more of a file is read than its header."""
+    """Only the header of a file is read."""
     with path.open(encoding="utf-8", errors="replace") as file:
         return channels_alone(file.read(LONGEST_BEGINNING))
 

@@ -32,7 +32,7 @@ from rig.services.provenance import with_provenance
 from rig.services.request import Request
 
 Names = tuple[str, ...]
-WAIT_S = 0.5  # for another thread, between two moments in which this one can be ended
+WAIT_S = 0.5  # for another thread, between two checks whether this one shall end
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ class ModelSession(Generic[F]):
         return self.kept.compare_fit(given or self.end)
 
     def judged(self) -> Judgement | None:
-        """The judgement on the present model before its search; None where only a search can decide, or has decided."""
+        """The verdict on the present model before its search; None if only a search can decide, or has decided."""
         return None if self._followed() is not None else self.kept.judge(self.end)
 
     def diagnosed(self) -> Diagnosis[F]:

@@ -29,10 +29,10 @@ from rig.record.values import KeptPose
 from rig.services.tables import BESIDE, INFLUENCES, load
 
 SENSOR = tuple(chain(*OUTPUTS))  # channels of the accelerometer's outputs
-TIME_TOLERANCE = 0.5  # sampling intervals by which a sample may be off before that is a gap
+TIME_TOLERANCE = 0.5  # in sampling intervals: a larger deviation of a time is a gap
 DISAGREE = 0.01  # of two rates
 AXIS = re.compile(r"(v|a|g|m|)([xyz])(|_v)")  # of a channel, by its name
-SENSED_UNITS = {  # what outputs in these units are better known in
+SENSED_UNITS = {  # more usual units for these
     "m/s^2": Sensed(1 / STANDARD_GRAVITY, "g"),
     "m/s2": Sensed(1 / STANDARD_GRAVITY, "g"),
     "deg/s": Sensed(3600.0, "deg/h"),
@@ -45,7 +45,7 @@ SENSITIVITIES = {
 
 
 @dataclass
-class Stream:
+class SampleStream:
     """Samples of one channel, in blocks that are read once. The other values are complete after the last block."""
 
     source: str
@@ -84,14 +84,14 @@ class Stream:
         return None
 
 
-def repairs(samples: Stream, n: int) -> Iterable[str]:
+def repairs(samples: SampleStream, n: int) -> Iterable[str]:
     """How the samples were changed before the analysis, and what limits them."""
     if samples.closed:
         missing = sum(length for _, length in samples.closed)
-        gaps = "a gap is" if len(samples.closed) == 1 else f"{len(samples.closed)} gaps are"
+        gaps = "a gap" if len(samples.closed) == 1 else f"{len(samples.closed)} gaps"
         yield (
-            f"{gaps} closed up, {missing:.3g} s in all: long averaging times are too short by up to "
-            f"{100 * missing * samples.rate_hz / n:.2g} %."
+            f"The analysis joins the samples across {gaps}, {missing:.3g} s in total: long averaging times are too "
+            f"short by up to {100 * missing * samples.rate_hz / n:.2g} %."
         )
     if samples.uneven_s:
         yield (
@@ -140,14 +140,14 @@ def agree_on_rate(measured: float | None, stated_hz: float, source: str) -> floa
 # A still table as a stream; its times must be evenly spaced.
 
 
-MOST_MISSING = 0.1  # of a record, in gaps that are closed up
-WHOLE = 0.1  # of a step, by which steps may be off whole numbers of them where single samples were lost
+MOST_MISSING = 0.1  # of a record, in gaps across which samples are joined
+WHOLE = 0.1  # of a sampling interval: tolerance of a step about a whole number of intervals, if single samples are lost
 FEW_GAPS = 0.01  # of all steps
-UNEVENNESS = 1e-3  # of a record, by which times may be off an even row, as where samples arrive in bursts
+UNEVENNESS = 1e-3  # of a record: tolerance of its times about evenly spaced ones; samples can arrive in bursts
 EVEN_REMEDY = "record again with evenly spaced samples (interpolated samples have less white noise than the sensor)"
 
 
-def table_stream(table: Table, channel: str | None, rate_hz: float | None) -> Stream:
+def table_stream(table: Table, channel: str | None, rate_hz: float | None) -> SampleStream:
     if table.kind != "still" or "alpha_deg" in table:
         kind = "poses" if table.kind == "still" else table.kind
         raise _no_record(f"{table.source}: a table of {kind}")
@@ -160,7 +160,7 @@ def table_stream(table: Table, channel: str | None, rate_hz: float | None) -> St
     rate = agree_on_rate(times.rate_hz if times else None, stated_hz, table.source)
     unit, corner_hz = _unit_of_channel(table, channel_name), table.number("filter_corner_hz", np.inf)
     other_channels = tuple(name for name in channels if name != channel_name)
-    samples = Stream(
+    samples = SampleStream(
         table.source, channel_name, rate, unit, iter([table.column(channel_name)]), corner_hz, other_channels,
         constants=table.constants,
         logged={name: [table.column(name)] for name in _list_logged_columns(table, channel_name)},
@@ -237,7 +237,7 @@ def _longest_stretch_text(far: NDArray[np.intp], n: int) -> str:
 
 
 def _check_gaps(gaps: Sequence[tuple[float, float]], length_s: float, source: str) -> None:
-    """Raises DataError where too much is missing to close the gaps up."""
+    """Raises DataError if too much is missing to join the samples across the gaps."""
     missing = sum(length for _, length in gaps)
     if missing > MOST_MISSING * length_s:
         longest = max(gaps, key=lambda gap: gap[1])
@@ -253,7 +253,7 @@ def _check_gaps(gaps: Sequence[tuple[float, float]], length_s: float, source: st
 UPRIGHT = 0.999  # g: a pose that is as good as along gravity
 
 
-def of_run(measured: MeasuredRun, channel: str | None, rate_hz: float | None) -> Stream:
+def of_run(measured: MeasuredRun, channel: str | None, rate_hz: float | None) -> SampleStream:
     first = next((recorded for recorded in measured.kept() if _is_still(recorded)), None)
     if first is None:
         raise RecordError(f"run {measured.name} has no still record; `rig run noise-floor` or `rig run soak` makes one")
@@ -263,7 +263,7 @@ def of_run(measured: MeasuredRun, channel: str | None, rate_hz: float | None) ->
     corner = float(measured.constants.get("filter_corner_hz", np.inf))
     outputs = tuple(name for name in names if name in SENSOR and name != channel_name)
     unit = units_of(measured.run, [channel_name]).get(channel_name, "V")
-    samples = Stream(
+    samples = SampleStream(
         measured.name, channel_name, rate, unit, iter(()), corner if channel_name in SENSOR else np.inf, outputs
     )
     samples.blocks, samples.constants = _still_blocks(measured, samples), measured.constants
@@ -274,7 +274,7 @@ def _is_still(recorded: KeptPose) -> bool:
     return recorded.pose.path.split(" ")[0] in (STILL, HOLD)
 
 
-def _still_blocks(measured: MeasuredRun, stream: Stream) -> Iterator[NDArray[Any]]:
+def _still_blocks(measured: MeasuredRun, stream: SampleStream) -> Iterator[NDArray[Any]]:
     """Blocks of the still record in order. Gaps, logged columns and poses along gravity are added to `stream`."""
     next_s = None
     for recorded in measured.kept():
@@ -296,7 +296,7 @@ def _still_blocks(measured: MeasuredRun, stream: Stream) -> Iterator[NDArray[Any
 
 
 def _supply_and_temperature(recorded: KeptPose) -> Iterator[tuple[str, list[Array]]]:
-    """Temperature of a block, and supply, as means of a second each: in blocks that take no room."""
+    """Temperature and supply of a block, as means of one second each, to use little memory."""
     samples, n = recorded.samples, len(recorded.samples.volts)
     temperature, supply = INFLUENCES
     if recorded.temperature_c is not None:
@@ -316,7 +316,7 @@ def coarse(recorded: KeptPose) -> dict[str, float]:
     return {} if step is None else {INFLUENCES[1]: step}
 
 
-def _note_upright(recorded: KeptPose, volts: Array, stream: Stream) -> None:
+def _note_upright(recorded: KeptPose, volts: Array, stream: SampleStream) -> None:
     """The mean output of the channel's axis along gravity."""
     alpha, beta = np.radians(recorded.pose.alpha_deg), np.radians(recorded.pose.beta_deg)
     gravity: Mapping[str, float] = {"x": np.sin(alpha) * np.cos(beta), "y": np.sin(alpha) * np.sin(beta)}
@@ -331,7 +331,7 @@ def _note_upright(recorded: KeptPose, volts: Array, stream: Stream) -> None:
 BLOCK = 1 << 17
 
 
-def axes(record: Record | None, data: str, channel: str | None, rate_hz: float | None) -> dict[str, Stream]:
+def axes(record: Record | None, data: str, channel: str | None, rate_hz: float | None) -> dict[str, SampleStream]:
     """The samples of one sensor's axes by name: the requested axis alone, or all axes of the first sensor.
 
     A channel whose name has no axis in it is called x. `rate_hz` is for data without a rate of their own. Raises
@@ -352,7 +352,7 @@ def _axis(channel: str) -> str:
     return name_parts[2] if name_parts else AXES[0]
 
 
-def _source(record: Record | None, data: str, rate_hz: float | None) -> Callable[[str | None], Stream]:
+def _source(record: Record | None, data: str, rate_hz: float | None) -> Callable[[str | None], SampleStream]:
     """The function that gives the stream of a channel; a table is read once for all channels."""
     path = Path(data)
     if path.suffix == ".npy":
@@ -369,7 +369,7 @@ def _source(record: Record | None, data: str, rate_hz: float | None) -> Callable
     return lambda channel: of_run(measured, channel, rate_hz)
 
 
-def _array_stream(path: Path, rate_hz: float | None) -> Stream:
+def _array_stream(path: Path, rate_hz: float | None) -> SampleStream:
     if rate_hz is None:
         raise DataError(f"{path}: an array does not contain the sample rate; give --rate HZ")
     try:
@@ -383,4 +383,6 @@ def _array_stream(path: Path, rate_hz: float | None) -> Stream:
         array = array.reshape(-1)
     if array.ndim != 1:
         raise DataError(f"{path}: has an array of shape {array.shape}; save one channel, of shape (n,)")
-    return Stream(str(path), "values", rate_hz, "count", (array[i : i + BLOCK] for i in range(0, len(array), BLOCK)))
+    return SampleStream(
+        str(path), "values", rate_hz, "count", (array[i : i + BLOCK] for i in range(0, len(array), BLOCK))
+    )

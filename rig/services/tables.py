@@ -142,8 +142,8 @@ def load_all(names: Sequence[str], notify: Callable[[str], None] = lambda _: Non
 def join_runs(
     tables: Sequence[Table], starts: Sequence[datetime | None], notify: Callable[[str], None] = lambda _: None
 ) -> Table:
-    """The tables of runs joined; times count from the beginning of the first, where all say when they were `starts`."""
-    from calibrations.joined import has_clock_restart, join_tables  # a single table needs it not
+    """The tables of runs, joined; times count from the start of the first if the `starts` of all are known."""
+    from calibrations.joined import has_clock_restart, join_tables  # a single table does not need it
 
     start_times = [start for start in starts if start is not None]
     if len(start_times) == len(tables):

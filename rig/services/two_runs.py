@@ -40,7 +40,7 @@ class Pair:
 
     @property
     def difference(self) -> float:
-        """The second less the first."""
+        """The second minus the first."""
         return self.second - self.first
 
     @property
@@ -105,7 +105,7 @@ ANGLE_DECIMALS = 2  # of a degree: nearer, gravity along an axis differs by 0.2 
 class RepeatedPoses:
     """Measurements at the same poses in two tables: rows (k,) of both, the visits of a pose in their order.
 
-    `difference` is the second less the first, in the outputs' unit, of shape (channels, k); `floor` the white noise of
+    `difference` is the second minus the first, in the outputs' unit, of shape (channels, k); `floor` the white noise of
     such a difference, per channel.
     """
 

@@ -110,7 +110,7 @@ class Desk:
         return self.beginnings.get((data, "", ""))
 
     def keep_report(self, key: str, text: str) -> None:
-        """Store a report by the content that it is of."""
+        """Store a report by the content of its data."""
         self.reports[key] = text
         while len(self.reports) > MOST_OPEN:
             self.reports.popitem(last=False)

@@ -37,9 +37,9 @@ LOST = {  # the message of a page whose server does not answer
     "trying_to_reconnect": "If a run is in progress, it continues: use the emergency stop of the rig to stop it now. "
     "This page connects again by itself. If it does not, start the workbench again.",
 }
-RETURN_S = 20.0  # a browser that lost the connection may come back so long; its analyses go on
+RETURN_S = 20.0  # time in which a browser may connect again after a loss; its analyses continue
 LEFT = 1001  # the code with which a browser closes the connection of a page that it leaves (RFC 6455, 7.4.1)
-PING_S, ANSWER_S = 8.0, 20.0  # between two looks at a connection, and until it counts as lost: an analysis delays both
+PING_S, ANSWER_S = 8.0, 20.0  # between two checks of a connection, and until it counts as lost: an analysis delays both
 PORT = 8473  # preferred, so that an open page finds a restarted server
 PORT_FILE = "web-port"
 POSES = 36  # of the analysis at the start

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from drivers.labjack_t7.stream import Calibration
+from drivers.labjack_t7.stream import RangeCalibration
 from drivers.labjack_t7.twin import FLASH_WORDS, Inputs
 from drivers.world.config import WorldConfig
 from drivers.world.world import World
@@ -42,7 +42,7 @@ def by_world(channels: tuple[str, ...]) -> Callable[[], Codes]:
 
 def by_numpy(channels: tuple[str, ...]) -> Callable[[], Codes]:
     """As `by_world`, in whole-array operations."""
-    random, calibration = np.random.default_rng(1), Calibration.from_flash(FLASH_WORDS, 10.0)
+    random, calibration = np.random.default_rng(1), RangeCalibration.from_flash(FLASH_WORDS, 10.0)
 
     def codes(channel: str) -> Codes:
         volts = output_v(random) if channel in ("vx", "vy") else np.full(SCANS, 2.5)

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from procedures.errors import NoAnswer
-from tests.handling import Calibration, by_imu_tk, by_imucal, by_procedure, on_stage, truth, world_of
+from tests.handling import LinearCalibration, by_imu_tk, by_imucal, by_procedure, on_stage, truth, world_of
 
 
-def _ended(seed: int, target_g: float) -> Calibration | None:
+def _ended(seed: int, target_g: float) -> LinearCalibration | None:
     """None for a hand that found no new position in time."""
     try:
         return by_procedure(seed, target_g=target_g)
@@ -24,7 +24,7 @@ def _ended(seed: int, target_g: float) -> Calibration | None:
         return None
 
 
-METHODS: dict[str, Callable[[int], Calibration | None]] = {
+METHODS: dict[str, Callable[[int], LinearCalibration | None]] = {
     "hand-positions, 1 mg": lambda seed: _ended(seed, 0.001),
     "hand-positions, 0.1 mg": lambda seed: _ended(seed, 0.0001),
     "imu_tk, 16 positions": by_imu_tk,
@@ -39,7 +39,7 @@ def compared(hands: int) -> dict[str, dict[str, Any]]:
     return {name: _summary(method, hands) for name, method in METHODS.items()}
 
 
-def _summary(method: Callable[[int], Calibration | None], hands: int) -> dict[str, Any]:
+def _summary(method: Callable[[int], LinearCalibration | None], hands: int) -> dict[str, Any]:
     found = [(method(seed), truth(world_of(seed))) for seed in range(1, hands + 1)]
     ended = [(calibration, true) for calibration, true in found if calibration is not None]
     errors = [calibration.errors(true) for calibration, true in ended]

@@ -37,7 +37,7 @@ def test_a_selection_is_short_in_an_address() -> None:
     assert numbers("") == numbers("a-b") == numbers("1-99999999") == ()
 
 
-def test_an_address_without_effects_is_not_one_that_does_not_say() -> None:
+def test_an_address_with_an_empty_list_of_effects_differs_from_one_without_a_list() -> None:
     from starlette.datastructures import QueryParams
 
     for state in (ModelState("7"), ModelState("7", "linear", ()), ModelState("a b", "", ("x", "my=a*t"), (3, 4))):
@@ -63,7 +63,7 @@ def own_effect(page: Page) -> None:
 
 
 @pytest.mark.slow
-def test_the_address_holds_data_effects_and_selection(workbench: Workbench, tmp_path: Path) -> None:
+def test_the_address_has_data_effects_and_selection(workbench: Workbench, tmp_path: Path) -> None:
     data = two_faults(tmp_path)
     page = workbench.visit(f"/?data={quote(data)}&model=linear&select=0-4,9")
     expect(page.get_by_role("button", name="Clear selection")).to_be_visible()
@@ -83,7 +83,7 @@ def test_the_address_holds_data_effects_and_selection(workbench: Workbench, tmp_
 
 
 @pytest.mark.slow
-def test_added_effects_are_kept_over_a_restart_of_the_server(
+def test_added_effects_stay_after_a_restart_of_the_server(
     visitor: Callable[[], BrowserContext], tmp_path: Path
 ) -> None:
     data, home = two_faults(tmp_path), {**os.environ, "RIG_HOME": str(tmp_path / "home")}
@@ -104,7 +104,7 @@ def test_added_effects_are_kept_over_a_restart_of_the_server(
 
 
 @pytest.mark.slow
-def test_a_run_is_told_by_a_notification_and_read_from_two_metres(workbench: Workbench) -> None:
+def test_a_run_sends_notifications_and_is_legible_from_two_metres(workbench: Workbench) -> None:
     other = workbench.visit("/record")
     other.add_init_script(NEWS)
     other.reload()

@@ -81,7 +81,9 @@ def test_every_page_fits_and_is_accessible(visitor_of: tuple[BrowserContext, str
     page.close()
 
 
-def test_an_address_without_a_page_leads_back(visitor_of: tuple[BrowserContext, str], watch: Watch) -> None:
+def test_an_address_without_a_page_has_a_link_to_the_workbench(
+    visitor_of: tuple[BrowserContext, str], watch: Watch
+) -> None:
     context, origin = visitor_of
     page = context.new_page()
     page.goto(f"{origin}/nothing")

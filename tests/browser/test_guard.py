@@ -77,7 +77,7 @@ def test_the_token_becomes_a_cookie_and_leaves_the_address() -> None:
         ({"cookie": f'rig-8473="{SECRET}"'}, "", 200),
     ],
 )
-def test_only_requests_of_the_own_page_are_let_in(headers: Mapping[str, str], query: str, status: int) -> None:
+def test_only_requests_of_the_own_page_are_accepted(headers: Mapping[str, str], query: str, status: int) -> None:
     answer = ask(query, headers)
     assert (answer.status, answer.let_in is not None) == (status, status == 200)
 
@@ -88,12 +88,12 @@ def test_websockets_are_guarded_as_well(headers: Mapping[str, str]) -> None:
     assert (answer.status, answer.let_in) == (1008, None)
 
 
-def test_a_websocket_of_our_own_page_is_let_in() -> None:
+def test_a_websocket_of_our_own_page_is_accepted() -> None:
     assert ask("", COOKIE | {"origin": "http://127.0.0.1:8473"}, "websocket").let_in == ""
 
 
 @pytest.mark.parametrize("headers", [COOKIE, {}])
-def test_what_a_page_may_load_is_only_ours(headers: Mapping[str, str]) -> None:
+def test_a_page_loads_only_our_own_files(headers: Mapping[str, str]) -> None:
     told = ask("", headers).headers
     assert "default-src 'none'" in told["content-security-policy"]
     assert "frame-ancestors 'none'" in told["content-security-policy"]
@@ -101,5 +101,5 @@ def test_what_a_page_may_load_is_only_ours(headers: Mapping[str, str]) -> None:
     assert told["x-content-type-options"] == "nosniff"
 
 
-def test_another_address_is_asked_for_by_its_own_name() -> None:
+def test_the_host_names_of_another_address_are_only_its_own() -> None:
     assert names("192.168.1.40", 80) == {"192.168.1.40:80"}

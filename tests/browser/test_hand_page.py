@@ -27,7 +27,7 @@ def address(served: Callable[..., Any]) -> tuple[dict[str, Any], Path]:
     return address
 
 
-def test_a_tablet_shows_and_sounds_each_position(
+def test_a_tablet_marks_each_position_with_a_picture_and_a_sound(
     address: tuple[dict[str, Any], Path], visitor: Callable[[], BrowserContext]
 ) -> None:
     context = visitor()

@@ -26,7 +26,7 @@ BIASES_V = (2.5, 2.501, 2.502, 2.503, 2.504, 2.510)  # 1 mV a year, and then a j
 ASKED = "/history?sensor=17&limit=bias-x%3D0.02&baseline=3&at=2024-08-01"
 
 
-def test_an_empty_record_says_what_to_do(workbench: Workbench) -> None:
+def test_an_empty_record_shows_the_next_step(workbench: Workbench) -> None:
     page = workbench.visit("/history")
     expect(page.get_by_text("No sensor has a calibration yet")).to_be_visible()
     expect(page.get_by_text("# serial: 17")).to_be_visible()
@@ -82,7 +82,7 @@ def dots(page: Page, picture: str, count: int) -> None:
     expect(page.locator(f"[aria-label='{picture}'] .points path")).to_have_count(count)
 
 
-def test_a_life_says_what_the_command_says_and_its_points_lead_to_their_runs(
+def test_a_history_shows_the_text_of_the_command_and_its_points_open_their_runs(
     workbench: Workbench, runs: list[str]
 ) -> None:
     page = workbench.visit("/record")
@@ -110,7 +110,7 @@ def test_a_life_says_what_the_command_says_and_its_points_lead_to_their_runs(
     page.wait_for_url(f"**/?data={quote(runs[2])}&model=linear")
 
 
-def test_what_is_asked_is_in_the_address_and_on_the_keys(workbench: Workbench, runs: list[str]) -> None:
+def test_the_request_is_in_the_address_and_has_keys(workbench: Workbench, runs: list[str]) -> None:
     page = workbench.visit(ASKED)
     dots(page, LIFE, 6)
     expect(page.get_by_label("Day", exact=True)).to_have_value("2024-08-01")
@@ -134,7 +134,7 @@ def test_what_is_asked_is_in_the_address_and_on_the_keys(workbench: Workbench, r
     page.get_by_label("Light or dark").click()
 
 
-def test_the_closest_to_a_day_and_whether_it_is_stale(workbench: Workbench, runs: list[str]) -> None:
+def test_the_calibration_closest_to_a_day_is_shown_with_its_staleness(workbench: Workbench, runs: list[str]) -> None:
     page = workbench.visit(ASKED)
     found = life(0.02)
     day = page.get_by_label("Day", exact=True)
@@ -179,7 +179,7 @@ def test_runs_that_are_not_used_have_a_reason_without_commands(workbench: Workbe
     expect(page.get_by_text(f"run {name} has no poses; the page Record shows its results")).to_be_visible()
 
 
-def test_what_cannot_be_shown_and_what_to_do(workbench: Workbench, runs: list[str]) -> None:
+def test_a_page_that_cannot_be_shown_gives_the_remedy(workbench: Workbench, runs: list[str]) -> None:
     page = workbench.visit("/history?sensor=18")
     expect(page.get_by_text("A control chart needs two calibrations, a drift three")).to_be_visible()
     for asked, told in (

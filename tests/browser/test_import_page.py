@@ -94,7 +94,7 @@ def test_a_file_is_imported_by_drop_downs(workbench: Workbench, tmp_path: Path) 
     assert columns["vx_v"][0] == pytest.approx(3.5, abs=1e-3)
 
 
-def test_a_time_that_fits_minutes_is_asked_about(workbench: Workbench, tmp_path: Path) -> None:
+def test_a_time_that_fits_minutes_gives_a_question(workbench: Workbench, tmp_path: Path) -> None:
     page = workbench.visit(f"/import?file={quote(str(foreign(tmp_path, 'time')))}")
     question = page.get_by_role("group", name="Unit of the time")
     expect(question).to_contain_text("It runs from 0 to 12.4; in s this is 0.1 s from one pose to the next")
@@ -117,7 +117,7 @@ def test_a_time_that_fits_minutes_is_asked_about(workbench: Workbench, tmp_path:
         assert record.columns(record.runs()[0].run)[0]["t_s"][-1] == pytest.approx(744.0)
 
 
-def test_what_a_person_chooses_has_the_unit_of_the_header_and_the_question_about_the_time(
+def test_a_chosen_column_has_the_unit_of_the_header_and_the_time_gives_a_question(
     workbench: Workbench, tmp_path: Path
 ) -> None:
     path = foreign(tmp_path, "Zeit")
@@ -138,7 +138,7 @@ def test_what_a_person_chooses_has_the_unit_of_the_header_and_the_question_about
     expect(page.get_by_text("1500.1 to 3500 V")).to_be_visible()  # what is shown is what is used
 
 
-def test_a_file_that_needs_names_leads_from_the_model_page(workbench: Workbench, tmp_path: Path) -> None:
+def test_the_model_page_opens_the_import_of_a_file_without_known_names(workbench: Workbench, tmp_path: Path) -> None:
     page = workbench.visit(f"/?data={quote(str(foreign(tmp_path)))}")
     alert = page.get_by_role("alert")
     expect(alert).to_contain_text("Cannot analyse")
@@ -154,7 +154,7 @@ def test_an_uploaded_file_replaces_no_other_of_its_name(tmp_path: Path) -> None:
         assert (path.name, path.read_text(), draft.exists()) == (name, content, False)
 
 
-def test_a_file_that_cannot_be_read_says_why(workbench: Workbench, tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_read_gives_the_reason(workbench: Workbench, tmp_path: Path) -> None:
     (broken := tmp_path / "broken.csv").write_text("only words\nare here\n")
     page = workbench.visit(f"/import?file={quote(str(broken))}")
     expect(page.get_by_role("alert")).to_contain_text("broken.csv")
@@ -164,7 +164,7 @@ def test_a_file_that_cannot_be_read_says_why(workbench: Workbench, tmp_path: Pat
     expect(page.get_by_role("alert")).to_contain_text("nothing.csv")
 
 
-def test_a_file_that_is_too_large_says_what_to_do(workbench: Workbench, tmp_path: Path) -> None:
+def test_a_file_that_is_too_large_gives_the_remedy(workbench: Workbench, tmp_path: Path) -> None:
     with (large := tmp_path / "large.csv").open("wb") as file:
         file.truncate(MOST_BYTES + 1)
     page = workbench.visit("/import")
@@ -191,7 +191,7 @@ def test_a_file_with_several_tables_asks_for_one(workbench: Workbench, tmp_path:
     expect(page.get_by_label("meaning of ax", exact=True)).to_have_value("ax")
 
 
-def test_a_table_that_was_taken_by_itself_says_how_to_take_another(workbench: Workbench, tmp_path: Path) -> None:
+def test_a_table_chosen_by_the_program_has_a_hint_to_choose_another(workbench: Workbench, tmp_path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     path = tmp_path / "one.h5"
     random = np.random.default_rng(2)
@@ -205,7 +205,7 @@ def test_a_table_that_was_taken_by_itself_says_how_to_take_another(workbench: Wo
     expect(page.locator("body")).not_to_contain_text("--topic")
 
 
-def test_a_unit_that_does_not_fit_the_values_is_asked_for(workbench: Workbench, tmp_path: Path) -> None:
+def test_a_unit_that_does_not_fit_the_values_gives_a_question(workbench: Workbench, tmp_path: Path) -> None:
     turn = "".join(f"90,{beta},{2500 + 1000 * np.cos(np.radians(beta)):.3f}\n" for beta in range(0, 360, 15))
     (path := tmp_path / "ours.csv").write_text(f"alpha_deg,beta_deg,vx_v\n{turn}")
     page = workbench.visit(f"/import?file={quote(str(path))}")
@@ -234,7 +234,7 @@ def test_an_import_can_be_cancelled(workbench: Workbench, tmp_path: Path) -> Non
     page.wait_for_url("**/record")
 
 
-def test_a_column_shows_the_range_of_its_first_rows_as_such(tmp_path: Path) -> None:
+def test_a_column_shows_the_range_of_its_first_rows(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("ax,ay,az\n" + "".join(f"{2.5 + 1e-4 * k:.4f},0.5,1.5\n" for k in range(20_000)))
     sheet = open_file(path)

@@ -90,7 +90,7 @@ def test_a_hidden_effect_is_found_added_saved_and_undone(workbench: Workbench, t
     expect(page.locator(".verdict .headline").first).to_contain_text("axis-misalignment")
 
 
-def test_an_effect_of_ones_own_with_a_mistake_and_then_right(workbench: Workbench, tmp_path: Path) -> None:
+def test_a_mistake_in_an_own_effect_is_shown_and_corrected(workbench: Workbench, tmp_path: Path) -> None:
     page = looked_at(
         workbench, unexplained(tmp_path, "worm gear"), "An effect that is not in the catalogue acts at stage-angle-beta"
     )
@@ -116,14 +116,14 @@ def tops(page: Page, *parts: str) -> list[float]:
     return [place["y"] for place in boxes if place is not None]
 
 
-def test_the_own_effect_is_below_the_candidates_where_it_has_no_proposal(workbench: Workbench, tmp_path: Path) -> None:
+def test_an_own_effect_without_a_proposal_is_below_the_candidates(workbench: Workbench, tmp_path: Path) -> None:
     page = looked_at(workbench, scattered(tmp_path), "No effect of the catalogue explains the residual: scatter")
     expect(page.get_by_text("Write your own effect below.")).to_be_visible()
     own, card = tops(page, ".own", ".card")
     assert own > card
 
 
-def test_of_a_still_record_the_allan_deviation_is_shown(workbench: Workbench, tmp_path: Path) -> None:
+def test_the_allan_deviation_of_a_still_record_is_shown(workbench: Workbench, tmp_path: Path) -> None:
     page = looked_at(workbench, wandering(tmp_path), "misses rate-random-walk")
     for picture in ("Allan deviation and model", "Spectrum and model", "Residual pattern"):
         expect(page.locator(f"[aria-label='{picture}'] .points path").first).to_be_attached()
@@ -141,7 +141,7 @@ def test_of_a_still_record_the_allan_deviation_is_shown(workbench: Workbench, tm
     expect(page.locator(".verdict .headline").first).to_contain_text("o effect is missing")
 
 
-def test_of_a_motion_its_samples_are_drawn(workbench: Workbench) -> None:
+def test_the_samples_of_a_motion_are_drawn(workbench: Workbench) -> None:
     with Record() as record:
         run = start(record, read_bench(), find("motion"), {}, Quiet({})).run.run
     page = workbench.visit(f"/?data={run}")
@@ -152,7 +152,7 @@ def test_of_a_motion_its_samples_are_drawn(workbench: Workbench) -> None:
     workbench.shot(page, "motion")
 
 
-def test_a_search_is_told_cancelled_and_begun_again(
+def test_a_search_shows_its_progress_and_is_cancelled_and_started_again(
     served: Callable[..., Any], context: BrowserContext, tmp_path: Path
 ) -> None:
     said, _ = served("--bench", str(held_up(tmp_path)))
@@ -173,7 +173,7 @@ def test_a_search_is_told_cancelled_and_begun_again(
     page.close()
 
 
-def test_a_failing_model_is_told_before_the_search_ends(
+def test_a_failing_model_is_shown_before_the_search_ends(
     served: Callable[..., Any], context: BrowserContext, tmp_path: Path, workbench: Workbench
 ) -> None:
     said, _ = served("--bench", str(held_up(tmp_path)))
@@ -203,7 +203,7 @@ effects: [{effect: bias}, {effect: scale-factor}, {effect: held-up}]
 """
 
 
-def test_a_fit_says_what_it_does_and_for_how_long_and_is_cancelled(
+def test_a_fit_shows_its_step_and_its_time_and_is_cancelled(
     served: Callable[..., Any], context: BrowserContext, tmp_path: Path
 ) -> None:
     said, _ = served("--bench", str(held_up(tmp_path)))
@@ -242,7 +242,7 @@ def test_selection_units_axes_and_poses(workbench: Workbench, tmp_path: Path) ->
     expect(page.locator("[aria-label='Residual pattern'] .hovertext")).to_contain_text("α 90°, β 90°")
 
 
-def test_selected_poses_are_left_out_with_a_reason_and_taken_in_again(workbench: Workbench) -> None:
+def test_selected_poses_are_excluded_with_a_reason_and_included_again(workbench: Workbench) -> None:
     bench, sweep = read_bench(), find("sweep")
     with Record() as record:
         settings = parse(sweep, {"inclinations_deg": "90,30", "step_deg": "45", "dwell_s": "0.5"})
@@ -268,9 +268,7 @@ def test_selected_poses_are_left_out_with_a_reason_and_taken_in_again(workbench:
     expect(page.get_by_role("button", name="Include again")).to_have_count(len(out) - 1)
 
 
-def test_what_cannot_be_looked_at_says_what_to_do_and_the_next_path_is_read(
-    workbench: Workbench, tmp_path: Path
-) -> None:
+def test_data_that_cannot_be_read_give_a_remedy_and_the_next_path_is_read(workbench: Workbench, tmp_path: Path) -> None:
     page = workbench.visit("/?data=no-such-run")
     expect(page.get_by_role("alert")).to_contain_text("there is no such file, and no run 'no-such-run'")
     private, table = tmp_path / "private.txt", tmp_path / "table.csv"
@@ -287,7 +285,7 @@ def test_what_cannot_be_looked_at_says_what_to_do_and_the_next_path_is_read(
 
 
 @pytest.mark.parametrize(("make", "rows"), [(thousand, "on 1000 poses"), (hundred_thousand, "on 100 poses")])
-def test_large_data_leave_the_page_alive(workbench: Workbench, tmp_path: Path, make: object, rows: str) -> None:
+def test_the_page_responds_with_large_data(workbench: Workbench, tmp_path: Path, make: object, rows: str) -> None:
     assert callable(make)
     page = workbench.visit(f"/?data={quote(make(tmp_path))}")
     dark = page.get_by_role("button", name="Light or dark")
@@ -314,7 +312,7 @@ class Stopping(Quiet):
             raise KeyboardInterrupt
 
 
-def test_an_analysis_of_a_part_of_a_run_says_so_and_is_updated(workbench: Workbench) -> None:
+def test_an_analysis_of_a_part_of_a_run_has_a_remark_and_is_updated(workbench: Workbench) -> None:
     settings = parse(find("sweep"), {"step_deg": "45", "inclinations_deg": "90,30,60"})
     with Record() as record:
         run = start(record, read_bench(), find("sweep"), settings, Stopping({})).run

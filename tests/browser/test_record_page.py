@@ -94,7 +94,9 @@ def test_two_runs_are_compared(workbench: Workbench, runs: list[str]) -> None:
 
 
 @pytest.mark.slow
-def test_what_is_of_two_kinds_is_not_compared_and_why(workbench: Workbench, runs: list[str], tmp_path: Path) -> None:
+def test_data_of_two_kinds_are_not_compared_and_the_reason_is_shown(
+    workbench: Workbench, runs: list[str], tmp_path: Path
+) -> None:
     still = wandering(tmp_path)
     page = workbench.visit(f"/compare?first={quote(still)}&second={runs[0]}")
     expect(page.get_by_role("alert").first).to_contain_text("is of still")

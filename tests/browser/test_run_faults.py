@@ -31,7 +31,7 @@ def accessible(page: Page, options: Mapping[str, Any] | None = None) -> None:
 
 
 @pytest.mark.parametrize("scheme", ["light", *before_release(["dark"])])
-def test_a_silent_stage_is_told_and_the_run_is_kept(
+def test_a_silent_stage_is_reported_and_the_run_stays_in_the_record(
     served: Callable[..., Any], visitor: Callable[[], BrowserContext], tmp_path: Path, scheme: Any
 ) -> None:
     bench = yaml.safe_load(DEMO.read_text(encoding="utf-8"))

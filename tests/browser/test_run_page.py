@@ -54,7 +54,7 @@ def tick(page: Page) -> None:
     expect(dialog.get_by_role("button", name="Begin")).to_be_enabled()
 
 
-def test_a_newcomer_gets_from_the_empty_record_to_the_falling_error(workbench: Workbench) -> None:
+def test_a_new_user_gets_from_the_empty_record_to_the_error_by_model(workbench: Workbench) -> None:
     page = workbench.visit("/")
     expect(page.get_by_text("There are no measurements yet")).to_be_visible()
     workbench.shot(page, "empty")
@@ -78,7 +78,7 @@ def test_a_newcomer_gets_from_the_empty_record_to_the_falling_error(workbench: W
     expect(page.locator(BARS)).to_have_count(2)
 
 
-def test_a_run_is_paused_left_alone_opened_again_and_stopped(workbench: Workbench) -> None:
+def test_a_paused_run_is_opened_again_and_stopped(workbench: Workbench) -> None:
     page = started(workbench, NIGHT)
     phase(page, "running")
     expect(page.locator(".live .q-select").first).to_contain_text("hold")  # what there is most of
@@ -137,7 +137,7 @@ def test_questions_are_asked_and_a_wrong_answer_is_refused(workbench: Workbench)
     expect(page).to_have_title("Run – rig")
 
 
-def test_a_plan_that_cannot_be_says_why_and_does_not_start(workbench: Workbench) -> None:
+def test_an_impossible_plan_gives_the_reason_and_does_not_start(workbench: Workbench) -> None:
     page = workbench.visit("/run?procedure=sweep&step_deg=ten")
     expect(page.get_by_role("alert")).to_contain_text("\"step (deg)\" is 'ten'; give a number")
     expect(page.get_by_role("button", name="Start")).to_be_disabled()
@@ -152,7 +152,7 @@ def test_the_live_picture_is_ready_before_a_run_begins(workbench: Workbench) -> 
 
 
 @pytest.mark.parametrize("way", ["key", "button"])
-def test_a_stop_while_the_connection_is_lost_acts_when_it_is_back(workbench: Workbench, way: str) -> None:
+def test_a_stop_during_a_lost_connection_acts_after_the_reconnection(workbench: Workbench, way: str) -> None:
     page = started(workbench, NIGHT)
     phase(page, "running")
     page.evaluate("socket.disconnect()")
@@ -165,7 +165,7 @@ def test_a_stop_while_the_connection_is_lost_acts_when_it_is_back(workbench: Wor
     phase(page, "stopped")
 
 
-def test_the_key_escape_closes_the_checks_and_forgets_them(workbench: Workbench) -> None:
+def test_the_key_escape_closes_the_checks_and_clears_them(workbench: Workbench) -> None:
     page = workbench.visit("/run?procedure=sweep&step_deg=45")
     for _ in range(2):
         page.get_by_role("button", name="Start").click()
@@ -175,7 +175,7 @@ def test_the_key_escape_closes_the_checks_and_forgets_them(workbench: Workbench)
         expect(page.get_by_role("dialog")).to_have_count(0)
 
 
-def test_a_setting_that_takes_one_of_a_few_is_a_list_and_what_they_mean_is_told(workbench: Workbench) -> None:
+def test_a_setting_with_a_few_values_is_a_list_with_an_explanation(workbench: Workbench) -> None:
     page = workbench.visit("/run?procedure=sweep&step_deg=45")
     page.get_by_text("What the settings mean").click()
     expect(page.get_by_text("both: a person turns the sensor over half way")).to_be_visible()
@@ -267,7 +267,7 @@ def tab_to(page: Page, text: str) -> None:
     raise AssertionError(f"Tab does not lead to {text}")
 
 
-def test_a_run_without_poses_is_made_by_keyboard_and_leads_to_its_results(workbench: Workbench) -> None:
+def test_a_run_without_poses_is_started_by_keyboard_and_opens_its_results(workbench: Workbench) -> None:
     page = workbench.visit("/run?procedure=level-check")
     expect(page.get_by_text("Takes", exact=True)).to_be_visible()
     tab_to(page, "Start")
@@ -288,7 +288,7 @@ def test_a_run_without_poses_is_made_by_keyboard_and_leads_to_its_results(workbe
 def test_a_bench_is_chosen_before_a_run_and_stays_during_it(workbench: Workbench) -> None:
     page = workbench.visit("/run?procedure=hand-positions&target_g=0.002")
     expect(page.get_by_text("adc: no input is wired to ax, ay, az")).to_be_visible()
-    expect(page.get_by_text("Another bench of the list Measure on may have it.")).to_be_visible()
+    expect(page.get_by_text("Another bench in the list Measure on may have it.")).to_be_visible()
     bench(page, "demonstration rig")
     expect(page.get_by_text("positioner")).to_have_count(0)  # the demonstration rig has none
     expect(page.get_by_label("Procedure")).to_have_value(re.compile("^hand-positions"))

@@ -33,7 +33,7 @@ def measured(workbench: Workbench, name: str, settings: dict[str, Any]) -> Page:
     return workbench.visit(f"/record/{run}")
 
 
-def test_the_night_of_a_soak_is_told_and_drawn(workbench: Workbench) -> None:
+def test_the_night_of_a_soak_is_described_and_drawn(workbench: Workbench) -> None:
     page = measured(workbench, "soak", {"duration_s": "1200", "interval_s": "300", "off_s": "60"})
     report = page.frame_locator(".report iframe")
     expect(report.get_by_role("heading", name="Course")).to_be_visible()

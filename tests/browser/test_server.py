@@ -53,7 +53,7 @@ def test_a_port_that_is_taken_is_refused() -> None:
     assert f"cannot listen at 127.0.0.1:{port}: Address already in use; give another --port" in ended.stderr
 
 
-def test_another_host_is_warned_of_and_has_a_token_as_well() -> None:
+def test_another_host_gives_a_warning_and_needs_a_token() -> None:
     words = [*WEB, "--json", "--host", "127.0.0.2"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as server:
         assert server.stdout is not None
@@ -88,7 +88,7 @@ def test_a_wrong_token_is_refused_in_the_browser(
         ("/run?procedure=misalignment&most_rounds=3000&target_deg=1e-12", "text=Planning; nothing moves"),
     ],
 )
-def test_a_server_that_is_to_end_waits_for_no_calculation(
+def test_a_server_that_ends_does_not_wait_for_a_calculation(
     path: str, shown: str, visitor: Callable[[], BrowserContext], tmp_path: Path
 ) -> None:
     words, home = (
@@ -112,7 +112,7 @@ def test_a_server_that_is_to_end_waits_for_no_calculation(
 
 
 @pytest.mark.parametrize("closed", [True, False])
-def test_a_page_that_is_left_computes_no_more(
+def test_a_closed_page_ends_its_computation(
     closed: bool, served: Callable[..., Any], visitor: Callable[[], BrowserContext], tmp_path: Path
 ) -> None:
     begun, ended = (_pipe(tmp_path / name) for name in ("begun", "ended"))
@@ -137,7 +137,7 @@ def _pipe(path: Path) -> int:
     return os.open(path, os.O_RDONLY | os.O_NONBLOCK)
 
 
-def test_a_page_says_that_its_server_is_lost_and_connects_again(
+def test_a_page_reports_a_lost_server_and_connects_again(
     visitor: Callable[[], BrowserContext], watch: Watch, tmp_path: Path
 ) -> None:
     with started(tmp_path) as said:
@@ -162,7 +162,7 @@ def test_a_page_says_that_its_server_is_lost_and_connects_again(
     watch.expects("")  # requests that no server answered
 
 
-def test_text_in_an_open_dialog_outlasts_a_restart_of_the_server(
+def test_text_in_an_open_dialog_stays_after_a_restart_of_the_server(
     visitor: Callable[[], BrowserContext], watch: Watch, tmp_path: Path
 ) -> None:
     with started(tmp_path) as said:
@@ -200,7 +200,7 @@ def test_a_click_while_the_connection_is_lost_does_nothing_later(workbench: Work
     expect(page.get_by_role("dialog")).to_be_visible()
 
 
-def test_the_address_lasts_over_a_restart_until_a_new_token_is_asked_for() -> None:
+def test_the_address_is_valid_after_a_restart_until_a_new_token_is_requested() -> None:
     said = []
     for options in ((), (), ("--new-token",)):
         words = [*WEB, "--json", *options]

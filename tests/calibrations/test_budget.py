@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from calibrations.effects.catalogue import catalogue
-from calibrations.fitting.budget import Budget, Line, make_budget, slow_freedom
+from calibrations.fitting.budget import Budget, BudgetRow, make_budget, slow_freedom
 from calibrations.fitting.fit import fit
 from calibrations.fitting.inputs import input_contributions
 from calibrations.geometry.orientation import rotation
@@ -183,7 +183,7 @@ def test_positions_have_no_angles_and_a_parameter_that_is_not_determined_has_no_
 def test_welch_and_satterthwaite_as_in_the_guide() -> None:
     """GUM H.1.6: 25, 9.7, 2.9 and 16.6 nm with 18, 25.6, 50 and 2 degrees of freedom have 16.7 together."""
     stds, freedoms = (25.0, 9.7, 2.9, 16.6), (18.0, 25.6, 50.0, 2.0)
-    lines = [Line("", "A", "", None, None, np.array([s]), f) for s, f in zip(stds, freedoms, strict=True)]
+    lines = [BudgetRow("", "A", "", None, None, np.array([s]), f) for s, f in zip(stds, freedoms, strict=True)]
     guide = Budget(tuple(lines))
     assert guide.combined[0] == pytest.approx(31.7, abs=0.1)
     assert guide.freedom[0] == pytest.approx(16.7, abs=0.3)

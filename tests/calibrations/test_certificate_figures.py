@@ -9,7 +9,7 @@ import pytest
 
 from calibrations.effects.catalogue import catalogue
 from calibrations.errors import DataError, ModelError
-from calibrations.fitting.budget import Budget, Line, make_budget, parameter_correlation
+from calibrations.fitting.budget import Budget, BudgetRow, make_budget, parameter_correlation
 from calibrations.fitting.fit import fit
 from calibrations.fitting.inputs import input_contributions
 from calibrations.geometry.earth import normal_gravity
@@ -106,8 +106,8 @@ def test_agreement_is_within_half_a_unit_of_the_first_digit() -> None:
 
 def test_a_budget_that_reaches_further_says_why() -> None:
     """Slow noise of which the rows say little: u allows for more of it than was found."""
-    drawn = Budget((Line("white noise", "A", "", None, None, np.array([1.0]), 50.0),
-                    Line("slow noise", "A", "", None, None, np.array([2.0]), 5.0)))  # fmt: skip
+    drawn = Budget((BudgetRow("white noise", "A", "", None, None, np.array([1.0]), 50.0),
+                    BudgetRow("slow noise", "A", "", None, None, np.array([2.0]), 5.0)))  # fmt: skip
     assert _explain_wider_interval(0, 2.36, 2.24, 1.0, drawn) == "slow noise is not well known, few degrees of freedom"
     assert _explain_wider_interval(0, 2.36, 0.9, 0.9, drawn) == "few degrees of freedom"
     assert _explain_wider_interval(0, 2.0, 2.24, 1.0, Budget(drawn.lines[:1])) == ""

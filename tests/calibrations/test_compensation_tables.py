@@ -16,7 +16,7 @@ from calibrations.compensation.forward import INVERTED, LEFT_OUT, steps_of, trac
 from calibrations.compensation.inverse import Range, compensate_residual, invert_model
 from calibrations.compensation.tables import CubicTable, spline_table
 from calibrations.effects.logged import RATE
-from calibrations.free_forms.bases import Basis, Clips, Line, Play, Products, Ramp, Spline, Waves
+from calibrations.free_forms.bases import Basis, Clips, Play, Products, Ramp, Spline, StraightLine, Waves
 from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.form import Form
 from calibrations.model import Estimate, Model, Term
@@ -31,7 +31,7 @@ from tests.calibrations.test_compensation_sources import interpreted
 OVER_FORCE = Spline(-1.06, 1.06, 8)
 FORMS = {
     "own-response": Form("own-response", "curve", "own", (OVER_FORCE,), sizes=(5e-4, 4e-4)),
-    "cross-response": Form("cross-response", "line", "cross", (Line(-1.0, 1.0),), sizes=(2e-3, 1e-3)),
+    "cross-response": Form("cross-response", "line", "cross", (StraightLine(-1.0, 1.0),), sizes=(2e-3, 1e-3)),
     "z-response": Form("z-response", "curve", "out-of-plane", (OVER_FORCE,), sizes=(5e-4, 4e-4), kept=(5, 3)),
     "scale-over-cross": Form("scale-over-cross", "curve", "cross", (OVER_FORCE,), "force", (5e-4, 4e-4)),
     "force": Form("force", "products", "force", (Products(3),), sizes=(1e-3, 1e-3)),
@@ -119,7 +119,7 @@ def test_every_language_has_the_same_tables(compiler: str, tmp_path: Path) -> No
         ("time-bias", "time", Waves(0.0, 1e4, 5, 2.0), ""),
         ("history", "own", Play((0.1, 0.5)), ""),
         ("own-response", "own", OVER_FORCE, "side"),
-        ("column:std", "variance", Line(0.0, 1e-6), ""),
+        ("column:std", "variance", StraightLine(0.0, 1e-6), ""),
     ],
 )
 def test_a_form_that_no_product_knows_is_left_out(place: str, driver: str, basis: Basis, factor: str) -> None:

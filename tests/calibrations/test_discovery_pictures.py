@@ -15,7 +15,7 @@ from calibrations.model.file import read_model
 from calibrations.presentation.chart import Bars
 from calibrations.presentation.charts.discovery import (
     MOST_CURVES,
-    Level,
+    ErrorLevel,
     album,
     brief,
     levels,
@@ -29,14 +29,14 @@ from tests.calibrations.test_pictures import by_hand, dots, panels, warm, warm_t
 
 
 def test_texts_of_many_bars_are_short() -> None:
-    steps = [Level(f"+ {k}", 10.0 - k, 11.0 - k, "3.8 mg") for k in range(9)]
+    steps = [ErrorLevel(f"+ {k}", 10.0 - k, 11.0 - k, "3.8 mg") for k in range(9)]
     for count, text in ((8, "10.0 × (3.8 mg)"), (9, "10.0 ×")):
         (bars,) = [bars for bars in panels(waterfall(steps[:count]))[0].series if isinstance(bars, Bars)]
         assert bars.texts[0] == text
 
 
 def test_an_error_far_below_the_noise_floor_has_a_bar() -> None:
-    (panel,) = panels(waterfall([Level("linear", 9.0, 9.5, "9 mg"), Level("+ a", 0.3, 0.2, "0.1 mg")]))
+    (panel,) = panels(waterfall([ErrorLevel("linear", 9.0, 9.5, "9 mg"), ErrorLevel("+ a", 0.3, 0.2, "0.1 mg")]))
     bars = next(series for series in panel.series if isinstance(series, Bars))
     assert panel.x.low is not None
     assert bars.base == panel.x.low < 0.3
@@ -59,7 +59,11 @@ def test_the_waterfall_falls_from_level_to_level() -> None:
 
 def test_the_diamond_of_unseen_rows_covers_no_text_of_a_short_bar() -> None:
     chart = waterfall(
-        [Level("linear", 90.0, 95.0, "9 mg"), Level("+ a", 1.0, 1.6, "0.1 mg"), Level("+ b", 1.2, 1.1, "0.1 mg")]
+        [
+            ErrorLevel("linear", 90.0, 95.0, "9 mg"),
+            ErrorLevel("+ a", 1.0, 1.6, "0.1 mg"),
+            ErrorLevel("+ b", 1.2, 1.1, "0.1 mg"),
+        ]
     )
     shown = figure(chart, "waterfall")
     (bars,) = [trace for trace in shown["data"] if trace["type"] == "bar"]

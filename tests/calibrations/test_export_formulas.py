@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from calibrations.compensation.inverse import Range, invert_model
 from calibrations.exporting.autopilots import Slot
 from calibrations.exporting.formats import export_model
-from calibrations.exporting.noise_files import Stream
+from calibrations.exporting.noise_files import ExportSettings
 from calibrations.exporting.simulated import ExportedFile
 from calibrations.model import Model
 from calibrations.table import Array
@@ -143,7 +143,7 @@ FORMATS: Mapping[str, Callable[[str, Array, Array], Array]] = {
 
 
 def export(form: str, *models: Model) -> ExportedFile:
-    return export_model(models, form, "a test", Slot(), Stream("/imu0", 200.0, {}))
+    return export_model(models, form, "a test", Slot(), ExportSettings("/imu0", 200.0, {}))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -255,7 +255,9 @@ def test_noise_made_from_a_file_of_kalibr_has_the_coefficients_of_the_model() ->
     """Kalibr: a sample has the standard deviation density sqrt(rate), a step of the bias walk / sqrt(rate)."""
     white, walk, rate = 2e-3, 4e-3, 50.0
     noises = {"white-noise": {"coefficient": white}, "rate-random-walk": {"coefficient": walk}}
-    made = export_model([of(noises), of(noises, "rad/s")], "kalibr", "a test", Slot(), Stream("/imu0", rate, {}))
+    made = export_model(
+        [of(noises), of(noises, "rad/s")], "kalibr", "a test", Slot(), ExportSettings("/imu0", rate, {})
+    )
     read, rng = yaml.safe_load(made.text), np.random.default_rng(8)
     for sensor in ("accelerometer", "gyroscope"):
         samples = read[f"{sensor}_noise_density"] * np.sqrt(rate) * rng.normal(size=450_000)

@@ -13,7 +13,7 @@ from imucal import FerrarisCalibrationInfo
 from calibrations.errors import ModelError
 from calibrations.exporting.autopilots import Slot
 from calibrations.exporting.formats import export_model
-from calibrations.exporting.noise_files import Stream
+from calibrations.exporting.noise_files import ExportSettings
 from calibrations.exporting.simulated import ExportedFile
 from calibrations.model import Model
 from calibrations.table import Array
@@ -30,7 +30,7 @@ WARM = {**LINEAR, "temperature-bias": {"slope": tuple(SLOPE.tolist())}}
 LEAN = {**LINEAR, "axis-nonorthogonality": {"xy": 0.4, "xz": -0.3, "yz": 0.2}}
 SQUARE = {**LINEAR, "quadratic-nonlinearity": {"square": (0.05, 0.05, 0.05)}}
 RATE_BIAS, RATE_SCALE = np.array([0.02, -0.03, 0.015]), np.array([1.004, 0.997, 1.01])
-STREAM = Stream("/imu0", 200.0, {})
+SETTINGS = ExportSettings("/imu0", 200.0, {})
 COMPASS: Mapping[str, Mapping[str, Numbers]] = {
     "field-strength": {"total": 0.48},
     "hard-iron": {"offset": (0.11, -0.07, 0.03)},
@@ -51,8 +51,8 @@ def gyroscope() -> Model:
     return of(values, "rad/s")
 
 
-def export(form: str, *models: Model, slot: Slot | None = None, stream: Stream = STREAM) -> ExportedFile:
-    return export_model(models, form, "a test", slot or Slot(), stream)
+def export(form: str, *models: Model, slot: Slot | None = None, settings: ExportSettings = SETTINGS) -> ExportedFile:
+    return export_model(models, form, "a test", slot or Slot(), settings)
 
 
 def felt(n: int = 50) -> Array:
@@ -168,8 +168,8 @@ def test_px4_names_small_corrections_that_it_does_not_apply() -> None:
 def test_kalibr_and_openvins_read_densities_in_si_units() -> None:
     accelerometer = of({"white-noise": {"coefficient": 1e-4}, "flicker-noise": {"coefficient": 1e-5}}, "g")
     turning = of({"white-noise": {"coefficient": 2e-3}, "rate-random-walk": {"coefficient": 1e-5}}, "deg/s")
-    stream = Stream("/imu0", 200.0, {"accelerometer": 4e-6})
-    made = export("kalibr", accelerometer, turning, stream=stream)
+    settings = ExportSettings("/imu0", 200.0, {"accelerometer": 4e-6})
+    made = export("kalibr", accelerometer, turning, settings=settings)
     read = yaml.safe_load(made.text)
     assert read.pop("rostopic") == "/imu0"
     assert read == pytest.approx(
@@ -184,7 +184,7 @@ def test_kalibr_and_openvins_read_densities_in_si_units() -> None:
     )
     (lost,) = made.losses
     assert (lost.effect, lost.most) == ("flicker-noise of the accelerometer", pytest.approx(0.664e-5))
-    made = export("openvins", accelerometer, turning, stream=stream)
+    made = export("openvins", accelerometer, turning, settings=settings)
     chain = yaml.safe_load(made.text.removeprefix("%YAML:1.0\n"))["imu0"]
     assert {key: chain[key] for key in read} == read
     assert all(np.allclose(chain[name], np.eye(3)) for name in ("Tw", "Ta", "R_IMUtoGYRO", "R_IMUtoACC"))

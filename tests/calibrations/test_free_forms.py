@@ -23,12 +23,12 @@ from calibrations.free_forms.bases import (
     DEGREE,
     Clips,
     Harmonics,
-    Line,
     Play,
     Preisach,
     Products,
     Settling,
     Spline,
+    StraightLine,
     Waves,
     spline,
 )
@@ -104,8 +104,10 @@ def test_columns_of_a_spline_have_unit_roughness_and_are_independent() -> None:
     assert roughness == pytest.approx(np.eye(basis.count), abs=2e-3)
 
 
-@pytest.mark.parametrize("basis", [Spline(0.0, 1.0, 5), Harmonics(2, 4), Waves(0.0, 1.0, 6, 2.0), Line(0.0, 1.0)])
-def test_a_basis_has_as_many_columns_as_it_counts(basis: Spline | Harmonics | Waves | Line) -> None:
+@pytest.mark.parametrize(
+    "basis", [Spline(0.0, 1.0, 5), Harmonics(2, 4), Waves(0.0, 1.0, 6, 2.0), StraightLine(0.0, 1.0)]
+)
+def test_a_basis_has_as_many_columns_as_it_counts(basis: Spline | Harmonics | Waves | StraightLine) -> None:
     assert basis(np.linspace(0.0, 1.0, 30)).shape == (30, basis.count)
 
 
@@ -132,7 +134,7 @@ def test_a_free_form_adds_the_same_whether_its_columns_are_kept_or_not() -> None
     )
     forms = (
         Form("scale-over-cross", "curve", "cross", (over,), "force", sizes=(1.0, 1.0)),
-        Form("scale-over-cross", "line", "cross", (Line(-1.0, 1.0),), sizes=(1.0, 1.0)),
+        Form("scale-over-cross", "line", "cross", (StraightLine(-1.0, 1.0),), sizes=(1.0, 1.0)),
     )
     effect = free_form(forms)
     rng = np.random.default_rng(3)
@@ -310,7 +312,7 @@ def test_uncertainties_beside_a_free_form_are_wider() -> None:
 def test_forces_of_the_chain_drive_the_form() -> None:
     table = poses(np.zeros((len(forces_of_sweep()), 2)))
     forces = specific_force(nominal_pose(table))
-    form = Form("z-response", "line", "out-of-plane", (Line(-1.0, 1.0),), sizes=(1.0, 1.0))
+    form = Form("z-response", "line", "out-of-plane", (StraightLine(-1.0, 1.0),), sizes=(1.0, 1.0))
     assert form.columns(table, forces, forces[:, 0], 0)[:, 0] == pytest.approx(forces[:, 2])
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibrations.noise.deviations import Curve, minimum_s, octaves
+from calibrations.noise.deviations import DeviationCurve, minimum_s, octaves
 from calibrations.table import Array
 from tests.calibrations.hidden_noise import fractional, white
 
@@ -16,7 +16,7 @@ N, RATE_HZ = 10_000, 10.0
 Made = Callable[[np.random.Generator], Array]
 
 
-def _turned(curve: Curve) -> Curve:
+def _turned(curve: DeviationCurve) -> DeviationCurve:
     """The longest time first."""
     turned = {name: getattr(curve, name)[::-1] for name in ("tau_s", "deviation", "low", "high", "edf")}
     return replace(curve, alpha=curve.alpha[::-1], **turned)

@@ -15,7 +15,7 @@ from calibrations.model import Model
 from calibrations.model.file import dump_model, parse_model, read_model
 from calibrations.noise.comparison import FREQUENCY, TIME, compare_deviations, deviation
 from calibrations.noise.fit import fit, without_effects
-from calibrations.noise.lines import Line
+from calibrations.noise.lines import SpectralLine
 from calibrations.noise.mixtures import chance, least_gain
 from calibrations.noise.patterns import pattern_of
 from calibrations.noise.record import Samples, Still, reduce_record
@@ -150,7 +150,8 @@ def test_a_given_line_is_taken_off_with_the_phase_that_it_has() -> None:
     x = white(np.random.default_rng(1)) + 0.3 * noises.sinusoid(SAMPLES, 0.0371)
     (channel,) = still(x=x).channels
     before, right, half = (
-        without_effects(channel, lines) for lines in ((), (Line(0.371, 0.3, 0.0),), (Line(0.371, 0.15, 0.0),))
+        without_effects(channel, lines)
+        for lines in ((), (SpectralLine(0.371, 0.3, 0.0),), (SpectralLine(0.371, 0.15, 0.0),))
     )
     at = int(np.argmin(np.abs(before.frequency_hz - 0.371)))
     heights = [each.density[at] * RATE_HZ for each in (before, right, half)]

@@ -69,7 +69,7 @@ def test_poses_that_stand_out_are_listed() -> None:
     off[[12, 140, 377]] = 60.0, -60.0, 60.0
     _, pattern = found(changed(off))
     assert pattern is not None
-    assert (pattern.text, pattern.expression) == ("3 poses stand out: #12, #140, #377", "")
+    assert (pattern.text, pattern.expression) == ("3 poses differ from the others: #12, #140, #377", "")
 
 
 def test_poses_keep_their_numbers_when_others_are_left_out() -> None:
@@ -78,13 +78,13 @@ def test_poses_keep_their_numbers_when_others_are_left_out() -> None:
     table = changed(off)
     _, pattern = found(table.rows(np.delete(np.arange(table.n), [3, 4, 200])))
     assert pattern is not None
-    assert (pattern.text, pattern.poses) == ("3 poses stand out: #12, #140, #377", (12, 140, 377))
+    assert (pattern.text, pattern.poses) == ("3 poses differ from the others: #12, #140, #377", (12, 140, 377))
 
 
 def test_poses_that_stand_out_are_listed_in_part() -> None:
     off = np.zeros(len(BETA))
     off[7] = 60.0
-    assert found(changed(off))[1].text == "1 pose stands out: #7"  # type: ignore[union-attr]
+    assert found(changed(off))[1].text == "1 pose differs from the others: #7"  # type: ignore[union-attr]
     off[np.arange(20, 29) * 13 % 500] = 60.0
     assert found(changed(off))[1].text.endswith("and 4 more")  # type: ignore[union-attr]
 

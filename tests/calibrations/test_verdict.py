@@ -101,7 +101,7 @@ def test_an_effect_that_noise_may_explain_as_well_is_no_form_of_a_cause() -> Non
         ({"added": ("a",), "left": "a step", "share_left": 0.1}, Verdict.UNEXPLAINED),
         ({"left": "a step", "share_left": 1.0}, Verdict.UNEXPLAINED),
         ({"left": "a step", "share_left": 1.0, "searched": False}, Verdict.INCOMPLETE),
-        ({"left": "2 poses stand out", "spoilt": True}, Verdict.UNEXPLAINED),
+        ({"left": "2 poses differ from the others", "spoilt": True}, Verdict.UNEXPLAINED),
         ({"undetermined": "too few orientations"}, Verdict.AMBIGUOUS),
         ({"left": "vy is constant", "unresponsive": True}, Verdict.NO_RESPONSE),
         ({"added": ("a",), "searched": False, "error": 27.1}, Verdict.AMBIGUOUS),

@@ -28,7 +28,7 @@ from drivers.errors import (
 )
 from drivers.transport import Address, Links
 from drivers.transport.address import Url
-from drivers.transport.channel_access import Reading
+from drivers.transport.channel_access import FieldReading
 from drivers.transport.channel_access_server import Field, records_port
 from drivers.transport.faults import Fault, faults_of
 from drivers.transport.server import Port, Server
@@ -396,5 +396,5 @@ def test_a_status_that_the_protocol_does_not_have_is_a_bad_frame() -> None:
 
 
 def test_an_alarm_without_a_name_is_its_number() -> None:
-    assert Reading(2.5, 3, 9, 0.0).alarm == "INVALID (COMM)"
-    assert Reading(2.5, 77, 9, 0.0).alarm == "77 (COMM)"
+    assert FieldReading(2.5, 3, 9, 0.0).alarm == "INVALID (COMM)"
+    assert FieldReading(2.5, 77, 9, 0.0).alarm == "77 (COMM)"

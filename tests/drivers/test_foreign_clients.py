@@ -18,7 +18,7 @@ from pipython.pidevice.interfaces.pisocket import PISocket
 from drivers.clock import serve_forever
 from drivers.labjack_t7 import driver as labjack_t7
 from drivers.labjack_t7 import twin as labjack_t7_twin
-from drivers.labjack_t7.stream import Calibration
+from drivers.labjack_t7.stream import RangeCalibration
 from drivers.omega_cn7500 import driver as omega_cn7500
 from drivers.omega_cn7500 import twin as omega_cn7500_twin
 from drivers.oriental_az import driver as oriental_az
@@ -88,7 +88,7 @@ def test_mbpoll_finds_an_absent_unit_silent(serve: Serve, small_world: Any) -> N
 @needs_mbpoll
 def test_mbpoll_reads_a_converter(serve: Serve, small_world: Any) -> None:
     settings = labjack_t7.Settings(channels={"supply": 5})
-    calibration = Calibration(3.2e-4, -3.2e-4, 33523.0, -10.6)
+    calibration = RangeCalibration(3.2e-4, -3.2e-4, 33523.0, -10.6)
     labjack_t7_twin.codes_of_volts(np.zeros((1, 1)), [calibration])  # loads what is compiled: mbpoll waits for a second
     url = serve(labjack_t7_twin.serve(small_world, {"adc": (1, settings)}))
     assert mbpoll(url, "-a", "1", "-t", "4:hex", "-c", "2", "-r", "55100") == "0x0011 0x2233"

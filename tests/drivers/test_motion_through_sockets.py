@@ -11,7 +11,7 @@ import pytest
 from drivers.clock import SimulatedClock
 from drivers.labjack_t7 import driver as labjack_t7
 from drivers.labjack_t7 import twin as labjack_t7_twin
-from drivers.philtec_d63 import SIMULATED, Curve
+from drivers.philtec_d63 import SIMULATED, CalibrationCurve
 from drivers.pi_e727 import driver as pi_e727
 from drivers.pi_e727 import twin as pi_e727_twin
 from drivers.recorder import Samples
@@ -48,7 +48,7 @@ def bench() -> Iterator[Bench]:
 
 
 def displaced_um(samples: Samples) -> np.ndarray:
-    return Curve.from_file(SIMULATED).displacement_um(samples.volts[:, 2])
+    return CalibrationCurve.from_file(SIMULATED).displacement_um(samples.volts[:, 2])
 
 
 def swing(values: np.ndarray, frequency_hz: float, rate_hz: float) -> complex:

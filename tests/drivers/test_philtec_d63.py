@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from drivers.errors import SensorFault
-from drivers.philtec_d63 import SIMULATED, Curve
+from drivers.philtec_d63 import SIMULATED, CalibrationCurve
 
 SHEET: dict[str, Any] = {
     "serial": 4711,
@@ -21,24 +21,24 @@ SHEET: dict[str, Any] = {
 
 
 @pytest.fixture
-def curve() -> Curve:
-    return Curve.from_mapping(SHEET)
+def curve() -> CalibrationCurve:
+    return CalibrationCurve.from_mapping(SHEET)
 
 
-def test_it_goes_through_the_points_of_the_sheet(curve: Curve) -> None:
+def test_it_goes_through_the_points_of_the_sheet(curve: CalibrationCurve) -> None:
     for side in ("near", "far"):
         gaps, volts = np.array(SHEET[side]).T
         assert curve.displacement_um(volts, side) == pytest.approx(gaps)
     assert (curve.serial, curve.date) == ("4711", "2026-03-01")
 
 
-def test_between_the_points_it_is_monotone(curve: Curve) -> None:
+def test_between_the_points_it_is_monotone(curve: CalibrationCurve) -> None:
     volts = np.linspace(1.0, 4.0, 1000)
     assert np.all(np.diff(curve.displacement_um(volts, "near")) > 0)
     assert np.all(np.diff(curve.displacement_um(volts, "far")) < 0)
 
 
-def test_the_shape_is_that_of_the_volts(curve: Curve) -> None:
+def test_the_shape_is_that_of_the_volts(curve: CalibrationCurve) -> None:
     assert curve.displacement_um(2.0).shape == ()
     assert curve.displacement_um([[1.0, 2.0, 3.0]]).shape == (1, 3)
     assert curve.displacement_um([]).shape == (0,)
@@ -54,13 +54,13 @@ def test_the_shape_is_that_of_the_volts(curve: Curve) -> None:
         (math.nan, "near", r"nan V, is outside the near side"),
     ],
 )
-def test_a_reading_off_the_curve_is_no_number(curve: Curve, volts: Any, side: Any, words: str) -> None:
+def test_a_reading_off_the_curve_is_no_number(curve: CalibrationCurve, volts: Any, side: Any, words: str) -> None:
     with pytest.raises(SensorFault, match=words):
         curve.displacement_um(volts, side)
 
 
 def test_a_side_that_was_not_calibrated() -> None:
-    near_only = Curve.from_mapping({key: value for key, value in SHEET.items() if key != "far"})
+    near_only = CalibrationCurve.from_mapping({key: value for key, value in SHEET.items() if key != "far"})
     with pytest.raises(SensorFault, match="has no far side"):
         near_only.displacement_um(2.0, "far")
 
@@ -79,12 +79,12 @@ def test_a_side_that_was_not_calibrated() -> None:
 )
 def test_what_is_no_curve_is_refused(change: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
-        Curve.from_mapping(SHEET | change)
+        CalibrationCurve.from_mapping(SHEET | change)
 
 
 def test_a_curve_without_a_date_is_refused() -> None:
     with pytest.raises(ValueError, match="date: missing"):
-        Curve.from_mapping({key: value for key, value in SHEET.items() if key != "date"})
+        CalibrationCurve.from_mapping({key: value for key, value in SHEET.items() if key != "date"})
 
 
 @pytest.mark.parametrize("text", ["- 1", "serial: [", "serial: 3\ndate: x\nnear: 5"])
@@ -92,10 +92,10 @@ def test_an_unusable_curve_file_is_named(tmp_path: Path, text: str) -> None:
     path = tmp_path / "curve.yaml"
     path.write_text(text)
     with pytest.raises(ValueError, match=r"curve\.yaml: "):
-        Curve.from_file(path)
+        CalibrationCurve.from_file(path)
     with pytest.raises(ValueError, match=r"none\.yaml"):
-        Curve.from_file(tmp_path / "none.yaml")
+        CalibrationCurve.from_file(tmp_path / "none.yaml")
 
 
 def test_the_shipped_curve_is_read() -> None:
-    assert Curve.from_file(SIMULATED).serial == "SIM-0063"
+    assert CalibrationCurve.from_file(SIMULATED).serial == "SIM-0063"

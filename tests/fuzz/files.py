@@ -19,7 +19,7 @@ from calibrations.importing.foreign import import_sheet, parse_csv
 from calibrations.importing.proposal import propose_mapping
 from calibrations.importing.sheet import read_sheet
 from calibrations.model.file import SHIPPED, parse_model
-from drivers.philtec_d63 import Curve
+from drivers.philtec_d63 import CalibrationCurve
 from procedures.session import Pose
 from rig.bench import DEFAULT, read_bench
 from rig.errors import RigError
@@ -105,7 +105,7 @@ def record_seed() -> bytes:
 
 def curve(data: bytes) -> object:
     document = load_yaml(data.decode("latin-1"))
-    return Curve.from_mapping(document) if isinstance(document, dict) else None
+    return CalibrationCurve.from_mapping(document) if isinstance(document, dict) else None
 
 
 def bench(data: bytes) -> object:

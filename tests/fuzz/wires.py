@@ -16,7 +16,7 @@ from pymodbus.pdu.register_message import ReadHoldingRegistersRequest
 from drivers.dpg2 import driver as dpg2
 from drivers.errors import DriverError
 from drivers.labjack_t7 import twin as t7
-from drivers.labjack_t7.stream import Calibration, Packets, packet_type
+from drivers.labjack_t7.stream import Packets, RangeCalibration, packet_type
 from drivers.pi_e727 import driver as pi_e727
 from drivers.pi_e727 import parameters as e727
 from drivers.pi_e727.twin import Controller
@@ -148,7 +148,7 @@ def packets(data: bytes) -> object:
 def calibration(data: bytes) -> object:
     words = struct.unpack(">82H", data[:164].ljust(164, b"\0"))
     with np.errstate(all="ignore"):
-        found = Calibration.from_flash(words, 10.0)
+        found = RangeCalibration.from_flash(words, 10.0)
         return found.table() if found.plausible else None
 
 

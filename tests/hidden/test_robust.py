@@ -88,11 +88,11 @@ def test_a_diagnosis_lists_outliers_too() -> None:
     result = diagnose(table, read_model("linear"))
     assert "quadratic-nonlinearity" in (result.candidates[0].name, *result.candidates[0].indistinguishable_from)
     assert diagnosis_document(result, "linear")["outliers"] == rows
-    assert f"{len(rows)} poses stand out" in str(result.caution)
+    assert f"{len(rows)} poses differ from the others" in str(result.caution)
     clean, rows = knocked(world(None, 4))
-    assert diagnose(clean, read_model("linear")).residual_structure == f"{len(rows)} poses stand out: " + ", ".join(
-        f"#{row}" for row in rows
-    )
+    numbers = ", ".join(f"#{row}" for row in rows)
+    expected = f"{len(rows)} poses differ from the others: {numbers}"
+    assert diagnose(clean, read_model("linear")).residual_structure == expected
 
 
 @pytest.mark.parametrize("defect", ["slipping contacts", "blind amplifier", "gear play", "creeping charge"])

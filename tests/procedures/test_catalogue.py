@@ -45,14 +45,14 @@ def test_a_spoilt_file_hides_no_other_procedure(folder: Path, content: bytes) ->
     assert set(paths(folder)) == {"noise-floor", *paths()}
 
 
-def test_it_is_loaded_when_it_is_asked_for(folder: Path) -> None:
+def test_a_procedure_is_loaded_at_its_first_use(folder: Path) -> None:
     procedure = find("noise-floor", folder)
     assert find("noise_floor", folder).path == procedure.path == folder / "noise_floor.py"
     assert procedure.doc.startswith("noise-floor: a still record.")
     assert procedure.defaults["repeats"] == 3
 
 
-def test_ones_own_file_comes_before_the_shipped_one(tmp_path: Path) -> None:
+def test_a_users_file_takes_precedence_over_the_shipped_one(tmp_path: Path) -> None:
     (tmp_path / "sweep.py").write_text('"""sweep: mine."""\ndef sweep(rig): ...')
     assert find("sweep", tmp_path).summary == "mine"
 
@@ -64,7 +64,7 @@ def test_an_unknown_name_is_answered_with_the_nearest() -> None:
         find("x")
 
 
-def test_a_file_that_fails_says_where(tmp_path: Path) -> None:
+def test_a_procedure_file_that_cannot_be_loaded_is_named(tmp_path: Path) -> None:
     (tmp_path / "bad.py").write_text("import nonsense_that_is_not_there\ndef bad(rig): ...")
     with pytest.raises(ProcedureError, match=r"bad.py: cannot load it: ModuleNotFoundError"):
         find("bad", tmp_path)
@@ -79,14 +79,14 @@ def test_a_file_that_fails_says_where(tmp_path: Path) -> None:
         ("raise SafetyLimit('too hot')", "^too hot$"),
     ],
 )
-def test_a_fault_in_ones_own_procedure_names_the_file_and_the_line(tmp_path: Path, body: str, message: str) -> None:
+def test_a_fault_in_a_users_procedure_names_the_file_and_the_line(tmp_path: Path, body: str, message: str) -> None:
     imports = "import numpy as np; from procedures.errors import SafetyLimit"
     (tmp_path / "mine.py").write_text(f"{imports}\ndef mine(rig):\n    {body}\n")
     with pytest.raises(ProcedureError, match=message):
         find("mine", tmp_path).function(None)
 
 
-def test_a_fault_of_the_program_in_ones_own_procedure_stays_one(tmp_path: Path) -> None:
+def test_an_error_of_the_program_in_a_users_procedure_passes_unchanged(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text("from procedures.settings import parse\ndef mine(rig):\n    parse(1, 2)\n")
     with pytest.raises(AttributeError):
         find("mine", tmp_path).function(None)

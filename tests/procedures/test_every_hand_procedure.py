@@ -32,10 +32,10 @@ PROCEDURES = {
 
 
 @pytest.mark.parametrize("name", PROCEDURES)
-def test_a_hand_that_never_lets_go_is_told_so(name: str) -> None:
+def test_a_hand_that_never_rests_ends_with_a_message(name: str) -> None:
     procedure = PROCEDURES[name]
     rig, _ = hand_session(procedure.world(1, replace(CALM, clings=1.0, clings_s=1e4)))
-    with pytest.raises(NoAnswer, match=r"no new position for 20 s; needed: .* times the noise at rest"):
+    with pytest.raises(NoAnswer, match=r"no new position for 20 s; next: .* times the noise at rest"):
         procedure.run(rig, wait_s=20.0)
 
 

@@ -17,7 +17,7 @@ NAMES = list(paths())
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_each_procedure_says_what_it_excites_and_cannot_see(name: str) -> None:
+def test_each_procedure_names_the_effects_that_it_excites_and_does_not_excite(name: str) -> None:
     procedure = find(name)
     assert procedure.doc.startswith(f"{name}: ")
     assert len(procedure.summary) < 80

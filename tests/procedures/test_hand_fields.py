@@ -53,13 +53,13 @@ def test_a_calm_hand_needs_no_more_positions_than_the_parameters_do(calm: Book) 
     assert calm.world.now_s < 150
 
 
-def test_the_sensor_lies_as_it_is_for_the_first_position(calm: Book) -> None:
+def test_the_first_position_needs_no_turn(calm: Book) -> None:
     first = next(guidance for guidance in calm.guided if guidance.moves)
     assert first.text.startswith("position 1: +z side up, +x side to the north, then let go")
     assert (first.up, first.north) == ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 
 
-def test_each_direction_of_the_field_is_the_one_that_was_wanted(calm: Book) -> None:
+def test_each_direction_of_the_field_is_the_requested_one(calm: Book) -> None:
     turns = [guidance for guidance in calm.guided if guidance.moves]
     known = slice(5, None)  # from the sixth position on the direction of the field in the room is known
     cosines = np.sum(directions(calm)[known] * np.array([guidance.target for guidance in turns])[known], axis=1)
@@ -109,7 +109,7 @@ def test_a_clumsy_hand_takes_longer_and_is_not_worse() -> None:
 
 
 @pytest.mark.slow
-def test_ten_hands_reach_what_was_asked() -> None:
+def test_ten_hands_reach_the_target() -> None:
     found = [fields_by_procedure(seed) for seed in range(1, 11)]
     assert max(100 * worst(errors) for errors in found) < 0.1
     assert max(errors.positions for errors in found) <= FEWEST + 2

@@ -46,7 +46,7 @@ def test_a_calm_hand_needs_no_more_positions_than_the_parameters_do(calm: Book) 
     assert calm.world.now_s < 120
 
 
-def test_each_position_is_what_the_person_was_told(calm: Book) -> None:
+def test_each_position_is_the_requested_one(calm: Book) -> None:
     turns = [guidance for guidance in calm.guided if guidance.moves]
     cosines = np.sum(ups(calm) * np.array([guidance.up for guidance in turns]), axis=1)
     assert np.degrees(np.arccos(np.minimum(cosines, 1.0))).max() < 35  # an edge is missed by 8 deg about each axis
@@ -60,13 +60,15 @@ def test_each_position_is_two_seconds_at_rest(calm: Book) -> None:
     assert calm.dwells[0].temperature_c is not None
 
 
-def test_the_directions_so_far_go_with_the_guidance(calm: Book) -> None:
+def test_the_guidance_has_the_directions_so_far(calm: Book) -> None:
     last = calm.guided[-1]
     assert isinstance(last, Guidance)
     assert not last.moves
     assert "0.001" not in last.text
-    assert "wanted 1 mg" in last.text
-    assert re.search(r"; the (scale factor of [xyz]|bias of [xyz]|nonorthogonality of . and .) is known to", last.text)
+    assert "target 1 mg" in last.text
+    assert re.search(
+        r"; the (scale factor of [xyz]|bias of [xyz]|nonorthogonality of . and .): standard uncertainty ", last.text
+    )
     assert np.array(last.taken) == pytest.approx(ups(calm), abs=0.02)
 
 
@@ -89,17 +91,17 @@ def test_a_hand_that_trembles_slips_and_errs_still_ends() -> None:
     assert max(max(dwell.stds.values()) for dwell in book.dwells) < 1.15 * 1.2e-3
 
 
-def test_a_position_that_is_known_is_not_taken_twice() -> None:
+def test_a_position_is_not_recorded_twice() -> None:
     """The hand always puts the sensor back as it was."""
     world = HandheldWorld(WorldConfig.ideal(), 1, Handheld(hand=CALM))
     rig, book = session(world)
     book.guide = book.guided.append
-    with pytest.raises(NoAnswer, match="this position is known already"):
+    with pytest.raises(NoAnswer, match="this position is measured already"):
         hand_positions(replace(rig, by_hand=HandAnalysis()), wait_s=15.0)
     assert len(book.dwells) == 1
 
 
-def test_a_side_that_was_taken_under_another_name_is_not_wanted_for_ever() -> None:
+def test_a_side_recorded_under_another_name_is_not_requested_for_ever() -> None:
     """At first the zero is not known, so a wrong side counts as the one that was told. Later that side is wanted."""
     world = HandheldWorld(WorldConfig.ideal(), 1, Handheld(hand=CALM))
     rig, book = session(world)

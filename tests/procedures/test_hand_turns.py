@@ -40,10 +40,10 @@ def test_a_calm_hand_needs_no_more_rests_than_the_accelerometer_does(calm: Book)
     assert len(calm.blocks) == 2 * FEWEST - 1  # a turn before each rest but the first
     assert calm.asked == ["at-rest"]
     assert calm.world.now_s < 150
-    assert "wanted 0.2 %" in calm.guided[-1].text
+    assert "target 0.2 %" in calm.guided[-1].text
 
 
-def test_the_person_is_told_that_the_first_turn_begins_with_a_rest(calm: Book) -> None:
+def test_the_first_guidance_asks_for_a_rest(calm: Book) -> None:
     positions = [guidance.text for guidance in calm.guided if guidance.text.startswith("position ")]
     assert positions[0].endswith("; keep the sensor still until this position is taken")
     assert not any("keep the sensor still" in text for text in positions[1:])
@@ -82,7 +82,7 @@ def test_the_table_of_a_run_has_the_constants_that_turns_need(calm: Book) -> Non
     assert turns_table(run, calm.blocks).constants.keys() == {"latitude_deg", "unit", "sample_rate_hz"}
 
 
-def test_a_run_that_was_interrupted_goes_on_with_its_turns(calm: Book) -> None:
+def test_an_interrupted_run_continues_with_its_turns(calm: Book) -> None:
     """It ended after a turn and before the rest: the turn does not count, and the next rest begins anew."""
     rig, book = hand_session(turn_world(1, CALM))
     book.blocks, book.dwells = list(calm.blocks[:14]), list(calm.dwells[:14])
@@ -124,7 +124,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("fault", list(FAULTS))
-def test_a_turn_that_cannot_be_used_is_kept_and_said(fault: str) -> None:
+def test_an_unusable_turn_is_recorded_with_the_reason(fault: str) -> None:
     rig, book = hand_session(turn_world(1, CALM))
     adc = FaultyAdc(book.world, channels=("vx", "vy"))
     adc.spoil = FAULTS[fault]
@@ -149,7 +149,7 @@ def test_a_clumsy_hand_is_not_worse() -> None:
 
 
 @pytest.mark.release
-def test_ten_hands_reach_what_was_asked() -> None:
+def test_ten_hands_reach_the_target() -> None:
     found = [turns_by_procedure(seed) for seed in range(1, 11)]
     assert max(errors.worst for errors in found) < 4e-3
     assert max(errors.positions for errors in found) <= FEWEST + 4

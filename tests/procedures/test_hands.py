@@ -26,7 +26,7 @@ def test_the_estimate_of_all_methods_is_exact_without_noise() -> None:
     assert residual < 1e-8
 
 
-def test_one_hand_is_calibrated_to_a_fraction_of_what_was_asked() -> None:
+def test_one_hand_reaches_a_fraction_of_the_target() -> None:
     found = by_procedure(1)
     errors = found.errors(truth(world_of(1)))
     assert np.abs(errors["bias_mg"]).max() < 1
@@ -36,7 +36,7 @@ def test_one_hand_is_calibrated_to_a_fraction_of_what_was_asked() -> None:
 
 
 @pytest.mark.slow
-def test_a_handful_of_hands_beside_the_prescriptions_of_others() -> None:
+def test_several_hands_are_compared_with_the_published_methods() -> None:
     found = compared(HANDS)
     ours, stage = found["hand-positions, 1 mg"], found["stage, 26 poses"]
     assert ours["failed"] == 0

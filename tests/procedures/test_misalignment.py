@@ -41,7 +41,7 @@ def dwells(poses: list[Pose], x: np.ndarray, y: np.ndarray) -> list[Dwell]:
     return made
 
 
-def test_the_signs_of_a_bracket_take_out_drift_and_hysteresis() -> None:
+def test_the_signs_of_a_bracket_cancel_drift_and_hysteresis() -> None:
     poses = list(round_poses(Centre(), 1))
     assert len(poses) == 16
     turn = [(k, p) for k, p in enumerate(poses) if p.path == "turn 1"]
@@ -64,12 +64,12 @@ def test_extremes_are_those_of_the_axes() -> None:
         assert found[1] == pytest.approx([np.degrees(0.03 / 1.02), np.degrees(-0.01 / np.hypot(1.02, 0.03))], abs=2e-3)
 
 
-def test_a_sensor_that_lies_backwards_has_its_extremes_behind() -> None:
+def test_a_sensor_mounted_backwards_has_its_extremes_at_the_opposite_angles() -> None:
     found = extremes(dwells(list(coarse_poses()), np.array([-1.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0])))
     assert abs(centre_of(found).beta_deg) == 180
 
 
-def test_only_a_bracket_that_is_well_off_is_centred_anew() -> None:
+def test_only_a_bracket_far_from_its_centre_is_centred_again() -> None:
     assert not is_off(Centre(1, (0, -1)), Centre())
     assert is_off(Centre(0, (0, 2)), Centre())
     assert is_off(Centre(2), Centre())
@@ -96,14 +96,14 @@ def test_two_rounds_are_enough_on_a_quiet_rig(package: Mapping[str, float], pose
     assert found[0, 0] == pytest.approx(centre_of(found).beta_deg, abs=1.5)
 
 
-def test_it_goes_on_while_rounds_disagree_and_ends_at_the_most() -> None:
+def test_the_search_continues_while_rounds_disagree_and_ends_at_most_rounds() -> None:
     noisy = {"noise": {"white_v": 0.05}}
     rig, book = session(world({}, **noisy))
     misalignment(rig, dwell_s=0.2, target_deg=0.01, most_rounds=3)
     assert len(book.dwells) == 6 + 3 * 16
 
 
-def test_it_goes_on_where_it_was_interrupted() -> None:
+def test_a_resumed_search_continues_at_the_interrupted_pose() -> None:
     whole, book = session(world({"turn_z_deg": 2.0}))
     misalignment(whole, dwell_s=0.1, most_rounds=2)
     for interrupted_at in (0, 3, 6, 17, 37):

@@ -17,7 +17,7 @@ from rig.planning.plan import plan
 POSES = [Pose(90, 45, 1, "design"), Pose(90, 45, 1, "design"), Pose(-37.5, 0, -1, "check"), Pose(0, 350, 0, "", 90, 1)]
 
 
-def test_what_is_written_is_read_again() -> None:
+def test_written_values_are_read_again() -> None:
     assert parse_poses(format_poses(POSES)) == POSES
 
 

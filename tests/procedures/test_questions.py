@@ -21,7 +21,7 @@ def test_several_words_for_yes_and_no_are_understood(said: str, kept: str) -> No
 
 
 @given(st.floats(-45, 45))
-def test_a_number_comes_back_to_the_last_bit(value: float) -> None:
+def test_a_number_is_written_and_read_bit_for_bit(value: float) -> None:
     assert float(LEVEL.checked(f" {value!r} deg")) == value
     assert float(LEVEL.checked(repr(value).replace(".", ","))) == value
 
@@ -31,7 +31,7 @@ def test_a_dial_is_confirmed_or_read(said: str) -> None:
     assert (DIAL.checked(said), DIAL.checked("90,083")) == ("90.0", "90.083")
 
 
-def test_a_choice_is_one_of_its_own() -> None:
+def test_a_choice_question_accepts_one_of_its_choices() -> None:
     assert SIDE.checked(" back ") == "back"
 
 
@@ -51,7 +51,7 @@ def test_a_choice_is_one_of_its_own() -> None:
         (replace(SIDE, choices=("resume", "repeat", "end")), "re", "answer with one of resume, repeat, end."),
     ],
 )
-def test_what_makes_no_sense_is_refused(question: Question, said: str, told: str) -> None:
+def test_invalid_answers_are_refused(question: Question, said: str, told: str) -> None:
     with pytest.raises(BadAnswer, match=question.name) as refused:
         question.checked(said)
     assert told in str(refused.value)
@@ -60,5 +60,5 @@ def test_what_makes_no_sense_is_refused(question: Question, said: str, told: str
 
 
 @pytest.mark.parametrize(("said", "chosen"), [("front", "front"), ("Back", "back"), ("b", "back")])
-def test_a_choice_is_known_by_its_beginning(said: str, chosen: str) -> None:
+def test_the_beginning_of_a_choice_selects_it(said: str, chosen: str) -> None:
     assert SIDE.checked(said) == chosen

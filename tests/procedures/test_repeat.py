@@ -43,7 +43,7 @@ def test_without_a_line_a_person_switches_the_power() -> None:
     assert book.asked == ["mounting", "power-cycle-1", "power-cycle-2"]
 
 
-def test_a_run_that_goes_on_within_a_tumble_does_not_switch_again() -> None:
+def test_a_run_resumed_within_a_tumble_does_not_switch_the_power_again() -> None:
     whole, book = session(world())
     repeat(whole, times=2, mount=False, dwell_s=0.1)
     rest, again = session(world(), dwells=book.dwells[:18])

@@ -89,7 +89,7 @@ def session(book: Book | None = None, beta: Stage | None = None, alpha: Stage | 
 
 
 @given(st.lists(POSES, max_size=12), st.integers(0, 12))
-def test_what_is_missing_is_what_the_record_does_not_hold(poses: list[Pose], held: int) -> None:
+def test_the_missing_poses_are_those_that_are_not_in_the_record(poses: list[Pose], held: int) -> None:
     book = Book(held=poses[:held])
     for pose in session(book).missing(poses):
         book.held.append(pose)
@@ -158,13 +158,13 @@ def test_only_a_stage_that_does_not_know_its_zero_is_homed() -> None:
     assert book.said == ["homing beta"]
 
 
-def test_what_a_person_confirms_lets_the_procedure_go_on() -> None:
+def test_a_confirmed_question_lets_the_procedure_continue() -> None:
     book = Book(answers={"mounting": "yes"})
     session(book).confirm("mounting", "Is it mounted?")
     assert book.said == ["Is it mounted?"]
 
 
-def test_what_a_person_declines_stops_it() -> None:
+def test_a_declined_question_stops_the_procedure() -> None:
     with pytest.raises(Declined, match='mounting: the answer to "Is it mounted\\?" is no'):
         session(Book(answers={"mounting": "no"})).confirm("mounting", "Is it mounted?")
 

@@ -46,7 +46,7 @@ def bench(*dwells: Dwell, line: bool = True, limits: Limits = NO_LIMITS) -> tupl
     return replace(rig, adc=Streaming(world, line=line)), book
 
 
-def test_the_schedule_holds_for_its_duration_in_intervals_that_double() -> None:
+def test_the_schedule_has_its_duration_in_intervals_that_double() -> None:
     poses = list(schedule(43200.0, 900.0, 10.0))
     counts = Counter(pose.path for pose in poses)
     holds = [counts[path] for path, _ in groupby(pose.path for pose in poses) if path.startswith("hold")]
@@ -61,7 +61,7 @@ def test_a_soak_shorter_than_an_interval_is_one_hold() -> None:
     assert Counter(pose.path for pose in schedule(5.0, 900.0, 10.0)) == {"reversal 0": 8, "hold 0": 1, "reversal 1": 8}
 
 
-def test_it_begins_cold_where_a_line_switches_the_power() -> None:
+def test_a_soak_begins_cold_if_a_line_switches_the_power() -> None:
     rig, book = bench()
     soak(rig, **SHORT, off_s=100.0)
     assert rig.adc.power_log == [False, True] + [True] * len({dwell.pose.path for dwell in book.dwells})
@@ -72,14 +72,14 @@ def test_it_begins_cold_where_a_line_switches_the_power() -> None:
 
 
 @pytest.mark.parametrize(("line", "off_s"), [(False, 100.0), (True, 0.0)])
-def test_else_the_power_is_as_it_was(line: bool, off_s: float) -> None:
+def test_the_power_stays_on_without_a_line_or_an_off_time(line: bool, off_s: float) -> None:
     rig, book = bench(line=line)
     soak(rig, **SHORT, off_s=off_s)
     assert rig.adc.power_log == []
     assert POWER_ON not in {reading.name for reading in book.read}
 
 
-def test_going_on_it_switches_on_and_not_off() -> None:
+def test_a_resumed_soak_switches_the_power_on_and_not_off() -> None:
     whole, book = bench()
     soak(whole, **SHORT, off_s=100.0)
     rest, done = bench(*book.dwells[:13])
@@ -89,7 +89,7 @@ def test_going_on_it_switches_on_and_not_off() -> None:
     assert all(rest.adc.power_log)
 
 
-def test_the_oven_is_told_before_every_reversal_and_hold_and_off_at_the_end() -> None:
+def test_the_oven_gets_its_set_point_before_every_reversal_and_hold_and_is_off_at_the_end() -> None:
     rig, book = bench()
     soak(rig, **SHORT, off_s=0.0, oven_c=45.0)
     assert isinstance(rig.oven, Oven)
@@ -104,7 +104,7 @@ def test_without_an_oven_it_is_left_alone() -> None:
 
 
 @pytest.mark.parametrize("until_steady", [True, False])
-def test_it_ends_when_it_is_told_that_all_is_steady(until_steady: bool) -> None:
+def test_a_soak_ends_when_all_quantities_are_steady(until_steady: bool) -> None:
     asked: list[tuple[int, float]] = []
 
     def steady(dwells: Sequence[Dwell], oven_c: float) -> bool:
@@ -131,7 +131,7 @@ def test_too_hot_a_sensor_stops_it_in_the_middle_of_a_hold() -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"duration_s": 0.0}, {"block_s": 0.0}, {"interval_s": 0.5}, {"off_s": -1.0}])
-def test_settings_that_cannot_be_are_refused(wrong: dict[str, float]) -> None:
+def test_impossible_settings_are_refused(wrong: dict[str, float]) -> None:
     rig, book = bench()
     with pytest.raises(SettingError, match="soak: "):
         soak(rig, **SHORT | wrong)

@@ -52,7 +52,7 @@ def test_a_level_inclination_has_no_negative() -> None:
     assert len(list(grid((0.0,), 180.0, "ang"))) == 6
 
 
-def test_a_turn_goes_the_way_it_is_told() -> None:
+def test_a_turn_has_the_requested_direction() -> None:
     assert [pose.beta_deg for pose in turn(90, 180, 0, 90, "")] == [180, 90, 0]
     assert {pose.direction for pose in turn(90, 180, 0, 90, "")} == {-1}
     assert {pose.direction for pose in turn(90, -180, 0, 90, "")} == {1}

@@ -52,7 +52,7 @@ def test_slopes_and_hysteresis_are_those_of_the_package() -> None:
         assert abs(scale.hysteresis[0]) < max(4 * scale.hysteresis[1], 2e-4)
 
 
-def test_the_oven_is_told_before_every_pose_and_off_at_the_end() -> None:
+def test_the_oven_gets_its_set_point_before_every_pose_and_is_off_at_the_end() -> None:
     rig, book = session(world(0.0))
     temperature_cycle(rig, temperatures_c=(35.0, 40.0), soak_s=0.0, dwell_s=0.1)
     assert isinstance(rig.oven, Oven)

@@ -49,7 +49,7 @@ def test_all_samples_of_a_turn_are_kept(turns: Book) -> None:
     assert max(kept.samples.volts[:, k].std() for kept, k in zip(whole, axis, strict=True)) < 2e-3
 
 
-def test_what_is_kept_is_not_turned_again(turns: Book) -> None:
+def test_recorded_turns_are_not_repeated(turns: Book) -> None:
     again = measured(rate_turn, dwells=tuple(turns.dwells[:-1]), rates_deg_s=(60.0,), rest_s=0.5)
     assert len(again.dwells) == len(turns.dwells)
     assert len(again.blocks) == 1
@@ -65,7 +65,7 @@ def test_a_magnetometer_goes_round_on_each_edge_upward_and_downward() -> None:
     ]
 
 
-def test_one_mount_and_not_over_is_the_books_horizontal_turn() -> None:
+def test_one_mount_without_over_is_the_horizontal_turn_of_the_book() -> None:
     poses = [d.pose for d in measured(magnetometer_turn, step_deg=45.0, mounts=1, over=False, dwell_s=0.05).dwells]
     assert {(pose.alpha_deg, pose.up) for pose in poses} == {(0.0, "z")}
     assert len(poses) == 8

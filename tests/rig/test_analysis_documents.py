@@ -248,7 +248,7 @@ def test_the_exit_status_is_0_whatever_the_verdict_and_1_with_check(
     assert ended.document
 
 
-def test_nothing_is_kept_of_an_analysis(rig: Rig, bent: str, tmp_path: Path) -> None:
+def test_an_analysis_stores_nothing_in_the_record(rig: Rig, bent: str, tmp_path: Path) -> None:
     before = sorted(tmp_path.iterdir())
     for command in ("fit", "compare", "diagnose", "discover"):
         rig(command, bent, "--model", "linear")

@@ -58,7 +58,7 @@ def test_an_eccentric_stage_is_found_until_its_error_table_is_given(rig: Rig, tm
 
 
 @pytest.mark.sockets
-def test_what_was_commanded_stays_beside_the_true_angles(rig: Rig, tmp_path: Path) -> None:
+def test_the_commanded_angles_stay_as_a_column(rig: Rig, tmp_path: Path) -> None:
     points = [[a, 0.2 * np.sin(np.radians(a)).item(), 0.004] for a in range(0, 360, 30)]
     file = bench(tmp_path, error_table=points)
     run = swept(rig, file, "--inclinations-deg", "90").document["run"]

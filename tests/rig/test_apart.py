@@ -90,7 +90,7 @@ def when(phase: str, also: Callable[[Status], bool] = lambda _: True) -> Status:
     raise AssertionError(f"never {phase}: {status}")
 
 
-def test_a_run_tells_how_it_stands_and_how_it_ended() -> None:
+def test_a_run_publishes_its_progress_and_its_end() -> None:
     seen: list[Status] = []
     status = carried_out("sweep", SMALL, lambda: seen.append(when("running", lambda s: s.done > 2)))
     assert (status.phase, status.state, status.done, status.total, status.error) == ("ended", "complete", 20, POSES, "")
@@ -101,7 +101,7 @@ def test_a_run_tells_how_it_stands_and_how_it_ended() -> None:
         assert record.run(status.run).state == "complete"
 
 
-def test_paused_and_gone_on_and_stopped() -> None:
+def test_a_run_is_paused_continued_and_stopped() -> None:
     def person() -> None:
         control.pause(when("running"))
         paused = when("paused")
@@ -129,7 +129,7 @@ def test_a_second_pause_changes_nothing() -> None:
     assert "stopped on a page of the workbench" in status.error
 
 
-def test_many_wishes_for_a_pause_are_one_pause() -> None:
+def test_several_requests_for_a_pause_are_one_pause() -> None:
     def person() -> None:
         done = 0
         for _ in range(2):
@@ -145,7 +145,7 @@ def test_many_wishes_for_a_pause_are_one_pause() -> None:
     assert carried_out("soak", {"duration_s": "43200"}, person).error.startswith("stopped on a page of the workbench")
 
 
-def test_a_wish_for_a_pause_while_the_run_connects_again_pauses_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_request_for_a_pause_while_the_run_reconnects_pauses_it(monkeypatch: pytest.MonkeyPatch) -> None:
     connections: list[int] = []
 
     def interrupted(*arguments: Any) -> Any:
@@ -165,7 +165,7 @@ def test_a_wish_for_a_pause_while_the_run_connects_again_pauses_it(monkeypatch: 
     assert len(connections) == 2
 
 
-def test_stopped_while_it_is_paused() -> None:
+def test_a_paused_run_is_stopped() -> None:
     def person() -> None:
         control.pause(when("running"))
         control.stop(when("paused"))
@@ -173,7 +173,7 @@ def test_stopped_while_it_is_paused() -> None:
     assert carried_out("soak", {"duration_s": "43200"}, person).state == "stopped"
 
 
-def test_a_question_is_asked_until_its_answer_makes_sense() -> None:
+def test_a_question_is_repeated_until_its_answer_is_valid() -> None:
     refused: list[str] = []
 
     def person() -> None:
@@ -189,10 +189,10 @@ def test_a_question_is_asked_until_its_answer_makes_sense() -> None:
 
     status = carried_out("sweep", SMALL, person, attended=True)
     assert status.state == "complete"
-    assert refused == ["'perhaps' is no answer; answer with yes or no", "perhaps"]
+    assert refused == ["'perhaps' is not a valid answer; answer with yes or no", "perhaps"]
 
 
-def test_what_cannot_be_run_is_told_as_well() -> None:
+def test_an_impossible_run_has_its_error_in_the_status() -> None:
     with pytest.raises(SettingError):
         carried_out("sweep", {"step_deg": "ten"}, lambda: None)
     status = control.latest()
@@ -223,7 +223,7 @@ def in_a_terminal(onlooker: Onlooker, seat: Seat) -> Outcome:
         return start(record, bench, sweep, parse(sweep, SMALL), watch)
 
 
-def test_a_run_of_a_terminal_is_told_as_well() -> None:
+def test_a_run_in_a_terminal_publishes_its_status() -> None:
     onlooker = Onlooker()
     run = in_a_terminal(onlooker, "nobody").run.run
     last = onlooker.seen[-1]
@@ -237,7 +237,7 @@ def test_a_run_of_a_terminal_is_told_as_well() -> None:
         control.pause(last)
 
 
-def test_quick_events_of_a_simulated_run_do_not_each_write_the_status(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_events_of_a_fast_simulated_run_share_a_write_of_the_status(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(status_file, "EVERY_S", 3600.0)
     onlooker = Onlooker()
     in_a_terminal(onlooker, "nobody")
@@ -279,7 +279,7 @@ def test_a_mark_that_cannot_be_written_does_not_prevent_a_stop_on_a_page() -> No
     assert carried_out("soak", {"duration_s": "43200"}, person).state == "stopped"
 
 
-def test_what_a_terminal_asks_is_answered_there() -> None:
+def test_a_question_of_a_terminal_is_answered_in_the_terminal() -> None:
     asked = OpenQuestion("mounting", "Is it mounted?", "yes or no")
     status = Status(KEY, 4711, "sweep", "a bench", phase="asking", asked=asked, seat="terminal")
     with pytest.raises(RigError, match="answer there"):
@@ -330,7 +330,7 @@ def test_a_process_that_fails_at_its_start_does_not_block_the_next_one(
     assert when("ended").key == second
 
 
-def test_of_two_answers_at_once_the_first_counts() -> None:
+def test_the_first_of_two_simultaneous_answers_counts() -> None:
     file(KEY, "answers").parent.mkdir(parents=True)
     os.mkfifo(file(KEY, "answers"))
     with process._pipe(KEY) as receive, file(KEY, "answers").open("w") as answers:

@@ -71,7 +71,9 @@ def test_files_that_cannot_be_imported_are_refused(
         ("daemon\t\t7/s3cret\nx\ty\t8\n", "line 1: a column has no name"),
     ],
 )
-def test_what_is_no_table_is_not_quoted(refused: Callable[..., str], work: Path, content: str, said: str) -> None:
+def test_the_message_about_a_file_without_a_table_does_not_quote_it(
+    refused: Callable[..., str], work: Path, content: str, said: str
+) -> None:
     (work / "private.txt").write_text(content)
     for command in ("import", "fit"):
         told = refused(command, "private.txt")

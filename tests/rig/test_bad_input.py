@@ -16,7 +16,7 @@ from tests.rig.conftest import MODEL, Rig
 from tests.rig.test_analysis_models import OWN
 
 
-def test_data_that_is_neither_file_nor_run(refused: Callable[..., str], rig: Rig) -> None:
+def test_data_that_is_neither_a_file_nor_a_run_is_refused(refused: Callable[..., str], rig: Rig) -> None:
     run = rig("import", "good.csv").out.partition(":")[0]
     said = refused("compare", f"{run[:-1]}x")
     assert f"{run[:-1]}x: there is no such file, and no run" in said
@@ -32,7 +32,7 @@ def test_a_path_without_a_file_is_no_run(refused: Callable[..., str], work: Path
         assert "god.csv: there is no such file. Did you mean 'good.csv'?" in refused("compare", path)
 
 
-def test_an_empty_record_says_so(rig: Rig) -> None:
+def test_an_empty_record_gives_a_message(rig: Rig) -> None:
     Record().close()
     for command in ("show", "fit"):
         ended = rig(command, "last")

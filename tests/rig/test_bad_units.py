@@ -40,7 +40,7 @@ def test_numbers_in_wrong_units_are_refused(refused: Refused, work: Path, conten
 
 
 @pytest.mark.parametrize("size", [2 * LARGEST_BYTES, LARGEST_BYTES // 2])
-def test_a_huge_file_of_nothing_is_answered_at_once(
+def test_a_huge_empty_file_is_refused_at_once(
     refused: Refused, work: Path, size: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with (work / "huge.csv").open("wb") as file:
@@ -59,7 +59,7 @@ def test_a_compensation_is_not_written_for_a_model_whose_units_differ(refused: R
     assert not (work / "c").exists()
 
 
-def test_looking_for_a_run_makes_no_record(
+def test_a_search_for_a_run_makes_no_record(
     rig: Callable[..., object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("RIG_HOME", str(tmp_path / "home"))

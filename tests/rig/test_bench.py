@@ -24,7 +24,7 @@ def test_the_simulated_rig_is_the_default() -> None:
     assert bench.constants["filter_corner_hz"] == 15.07
 
 
-def test_a_bench_comes_back_from_its_document() -> None:
+def test_a_bench_is_read_again_from_its_document() -> None:
     bench = read_bench()
     assert Bench.model_validate(bench.document()) == bench
 
@@ -32,7 +32,7 @@ def test_a_bench_comes_back_from_its_document() -> None:
 CURVE = "serial: '63'\ndate: 2026-11-21\nnear: [[0, 0], [10, 1], [20, 2], [30, 3]]\n"
 
 
-def test_a_curve_beside_the_file_is_read_into_the_bench(bench_file: Callable[..., Path]) -> None:
+def test_a_curve_in_the_folder_of_the_bench_file_is_read(bench_file: Callable[..., Path]) -> None:
     path = bench_file({"d63": {"curve": "d63.yaml", "direction": -1}})
     (path.parent / "d63.yaml").write_text(CURVE)
     bench = read_bench(path)
@@ -138,7 +138,7 @@ def test_every_driver_is_found_by_its_file() -> None:
         ("seed: [", "the bench file is not YAML"),
     ],
 )
-def test_what_is_wrong_is_said_with_its_place(
+def test_a_fault_of_the_bench_file_is_named_with_its_key(
     bench_file: Callable[..., Path], changes: dict[str, object] | str, said: str
 ) -> None:
     path = bench_file(changes)
@@ -153,12 +153,12 @@ def test_results_of_the_users_own_procedures_can_have_limits(bench_file: Callabl
     assert read_bench(path).result_limits["mass"] == 2.0
 
 
-def test_a_misspelt_key_is_named_before_what_is_missing_for_it(golden, bench_file: Callable[..., Path]) -> None:
+def test_a_misspelt_key_is_named_before_the_missing_key(golden, bench_file: Callable[..., Path]) -> None:
     with golden.refused(BenchError):
         read_bench(bench_file("intruments: {}"))
 
 
-def test_a_file_that_is_not_there_is_said(golden, tmp_path: Path) -> None:
+def test_a_missing_bench_file_is_named(golden, tmp_path: Path) -> None:
     with golden.refused(BenchError):
         read_bench(tmp_path / "bench.yaml")
 
@@ -251,7 +251,7 @@ def test_a_real_address_is_passed_on_and_a_simulated_one_may_say_where_it_listen
     assert not bench.simulated
 
 
-def test_an_error_table_is_read_from_beside_the_file_and_goes_with_the_bench(
+def test_an_error_table_in_the_folder_of_the_bench_file_becomes_a_part_of_the_bench(
     bench_file: Callable[..., Path], tmp_path: Path
 ) -> None:
     (tmp_path / "alpha.csv").write_text("angle_deg,error_deg,std_deg\n0,0.01,0.001\n30,0.02,0.001\n")

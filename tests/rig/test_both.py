@@ -74,7 +74,7 @@ def test_a_still_record_and_poses_have_no_model_in_common(golden, tmp_path: Path
         ({}, ("vx_v",), None),
     ],
 )
-def test_a_still_record_is_told_as_what_is_sensed_where_its_scale_factor_is_stated(
+def test_a_still_record_with_a_stated_scale_factor_is_shown_in_the_sensed_unit(
     tmp_path: Path, constants: dict[str, str | float], columns: tuple[str, ...], expected: tuple[float, str] | None
 ) -> None:
     rows = dict.fromkeys(columns, 2.5 + 1e-3 * np.random.default_rng(1).standard_normal(5000))

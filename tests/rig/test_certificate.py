@@ -98,7 +98,7 @@ def _page(rig: Rig, model: str, work: Path) -> str:
     return (work / "only.html").read_text()
 
 
-def test_the_laboratory_is_no_part_of_what_a_run_depends_on() -> None:
+def test_the_configuration_of_a_run_does_not_include_the_laboratory() -> None:
     bench: dict[str, Any] = {"instruments": {}}
     one, other = (Bench.model_validate(bench | {"laboratory": {"name": name}}) for name in ("A", "B"))
     assert one.configuration("sweep", {}) == other.configuration("sweep", {})

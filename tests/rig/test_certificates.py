@@ -74,7 +74,7 @@ def test_a_run_with_an_expired_one_is_marked_everywhere(rig: Rig, file: Callable
 
 
 @pytest.mark.sockets
-def test_a_run_with_good_ones_says_nothing(rig: Rig, file: Callable[..., str]) -> None:
+def test_a_run_with_valid_certificates_has_no_remark(rig: Rig, file: Callable[..., str]) -> None:
     ended = rig(*SWEEP, "--bench", file(GOOD, GOOD), "--json")
     document = ended.document
     assert document["expired"] is None

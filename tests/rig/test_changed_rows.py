@@ -277,7 +277,7 @@ def recorded_file(folder: Path) -> tuple[int, str, Path, bytes]:
         (b"sqlite_autoindex_runs_1", b"sqlite_autoindey_runs_1"),
     ],
 )
-def test_a_damaged_schema_costs_no_row(tmp_path: Path, right: bytes, wrong: bytes) -> None:
+def test_a_damaged_schema_loses_no_row(tmp_path: Path, right: bytes, wrong: bytes) -> None:
     run, whole, path, data = recorded_file(tmp_path)
     assert right in data[:PAGE]
     path.write_bytes(data[:PAGE].replace(right, wrong, 1) + data[PAGE:])
@@ -301,7 +301,7 @@ def with_bit(data: bytes, at: int, bit: int) -> bytes:
 
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("bit", [0, 4])
-def test_one_changed_bit_beside_the_texts_of_the_schema_costs_no_row(tmp_path: Path, place: str, bit: int) -> None:
+def test_one_changed_bit_outside_the_texts_of_the_schema_loses_no_row(tmp_path: Path, place: str, bit: int) -> None:
     run, whole, path, data = recorded_file(tmp_path)
     path.write_bytes(with_bit(data, PLACES[place](data[:PAGE]), bit))
     recovered = recover(path, tmp_path / "new")

@@ -57,7 +57,7 @@ def test_an_alarm_that_needs_a_power_cycle_is_not_asked_about(check: Callable[..
     assert ended.status == 3
 
 
-def test_without_the_option_an_alarm_is_shown_with_the_way_out(check: Callable[..., Any]) -> None:
+def test_an_alarm_is_shown_with_its_remedy_without_the_option(check: Callable[..., Any]) -> None:
     ended = check(alarm=TIME_OUT)
     assert ended.status == 3
     assert row(ended.out, "alarm").endswith("reset the alarm with `rig check --reset`, or switch the drive off and on")
@@ -81,7 +81,7 @@ def test_parameters_at_unconfirmed_addresses_are_shown_where_they_are_used(check
     assert "0x0386" in row(used, "own limits")
 
 
-def test_an_address_that_holds_no_time_out_fails_the_check(check: Callable[..., Any]) -> None:
+def test_a_wrong_register_of_the_time_out_fails_the_check(check: Callable[..., Any]) -> None:
     """Here 0x00F8, the drive's temperature: a wrong address would change another parameter of the drive."""
     ended = check(communication_timeout_s=1, communication_timeout_register=0x00F8)
     assert ended.status == 3

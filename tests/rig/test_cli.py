@@ -40,7 +40,7 @@ def test_help_lists_every_command_and_imports_none() -> None:
     assert not {"numpy", "sqlalchemy", "rich", "yaml", "rig.cli.commands.run"} & modules
 
 
-def test_a_run_begins_without_what_only_reports_and_motions_need() -> None:
+def test_a_run_loads_no_module_that_only_reports_and_motions_need() -> None:
     """These take as long to load as all the rest."""
     _, modules = loaded("import rig.cli.commands.run")
     assert "rig.runs.runner" in modules
@@ -94,7 +94,9 @@ def test_an_error_is_one_message(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().err == "rig: bench.yaml, key x: no such key\n"
 
 
-def test_a_fault_of_the_program_says_so(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fault_of_the_program_is_called_a_fault_of_the_program(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert exit_status(raising(KeyError("x"))) == PROGRAM_FAULT
     assert capsys.readouterr().err == "rig: a fault of this program: KeyError: 'x'. RIG_DEBUG=1 shows where.\n"
     monkeypatch.setenv("RIG_DEBUG", "1")
@@ -107,13 +109,13 @@ def test_a_command_may_return_its_status() -> None:
     assert exit_status(lambda: None) == 0
 
 
-def test_ctrl_c_is_status_4(capsys: pytest.CaptureFixture[str]) -> None:
+def test_ctrl_c_ends_with_status_4(capsys: pytest.CaptureFixture[str]) -> None:
     assert exit_status(raising(KeyboardInterrupt())) == 4
     assert exit_status(raising(click.Abort())) == 4
     assert "stopped" in capsys.readouterr().err
 
 
-def test_a_reader_that_goes_away_is_no_fault() -> None:
+def test_a_closed_pipe_is_no_fault() -> None:
     program = "import sys\nfrom rig.cli import main\nsys.stdin.read()\nmain(['--help'])"
     child = subprocess.Popen(
         [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE

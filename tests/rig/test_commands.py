@@ -175,7 +175,7 @@ def test_a_table_is_not_written_under_the_ending_of_another_format(refused: Call
 
 
 @pytest.mark.parametrize("words", [("show", "nothing"), ("resume", "nothing"), ("compare", "nothing")])
-def test_looking_for_a_run_makes_no_record(rig: Rig, words: tuple[str, ...]) -> None:
+def test_a_search_for_a_run_makes_no_record(rig: Rig, words: tuple[str, ...]) -> None:
     ended = rig(*words)
     assert ended.status == 2
     assert "no run 'nothing': there is no record yet in " in ended.err

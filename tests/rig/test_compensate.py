@@ -48,7 +48,7 @@ def test_the_document_of_a_compensation_has_its_facts(rig: Rig, physical: Path) 
     ]
 
 
-def test_what_it_leaves_of_unseen_poses_is_shown(rig: Rig, work: Path) -> None:
+def test_the_error_on_unseen_poses_is_shown(rig: Rig, work: Path) -> None:
     (work / "fitted.yaml").write_text(
         dump_model(model({"bias": {"bias": (2.5, 2.5)}, "scale-factor": {"scale": (1.0, 1.0)}}))
     )

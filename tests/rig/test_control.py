@@ -115,7 +115,7 @@ def test_its_pictures_are_files_of_each_sensor(rig: Rig, tmp_path: Path) -> None
     )
 
 
-def test_a_standard_that_was_measured_once_keeps_no_other_from_its_chart(rig: Rig) -> None:
+def test_a_standard_with_one_measurement_does_not_prevent_the_charts_of_others(rig: Rig) -> None:
     checks(QUIET)
     checks(QUIET[:1], ONE | {"sensor": {"name": "ADXL203", "serial": "CS-9"}})
     ended = rig("control", "--json")

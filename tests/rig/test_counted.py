@@ -18,7 +18,7 @@ from rig.services.session import model_session
 from tests.browser.measured import hidden, two_faults
 
 
-def test_a_counted_search_tells_what_it_tries() -> None:
+def test_a_counted_search_shows_what_it_tests() -> None:
     counted = CountedEffects({name: catalogue()[name] for name in ("bias", "hysteresis")})
     assert (counted.text, counted.share) == ("Fitting the model", 0.0)
     effects = iter(counted.values())
@@ -33,7 +33,7 @@ def test_a_counted_search_tells_what_it_tries() -> None:
     assert (counted.round, counted.doing) == (2, "")
 
 
-def test_an_analysis_says_what_it_does(tmp_path: Path) -> None:
+def test_an_analysis_shows_its_present_step(tmp_path: Path) -> None:
     texts: list[str] = []
 
     def seen(text: str) -> None:

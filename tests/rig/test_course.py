@@ -18,7 +18,7 @@ def dwell(number: int, path: str = "hold 1") -> Dwell:
 
 
 @pytest.mark.parametrize("n", [1, MOST, MOST + 1, 5000])
-def test_however_many_dwells_there_are_the_parts_stay_few(n: int) -> None:
+def test_many_dwells_are_shown_in_a_few_parts(n: int) -> None:
     course = Course()
     for number in range(n):
         course.add(dwell(number))
@@ -32,7 +32,7 @@ def test_however_many_dwells_there_are_the_parts_stay_few(n: int) -> None:
     assert np.all(np.diff(t_s) > 0)
 
 
-def test_what_was_measured_has_names() -> None:
+def test_the_measured_quantities_have_names() -> None:
     course = Course()
     assert course.names == []
     course.add(dwell(1))

@@ -18,7 +18,7 @@ from drivers.world.world import World
 from procedures.sweep import grid
 from rig.bench import read_bench
 from rig.bench.file import DEMO
-from rig.services.hidden_faults import MATERIAL, MECHANISMS, Curve, Faults, Group, group_steps, hidden_faults
+from rig.services.hidden_faults import MATERIAL, MECHANISMS, Faults, Group, OutputChange, group_steps, hidden_faults
 from tests.rig.conftest import Rig
 
 SAME = {
@@ -53,13 +53,13 @@ def test_each_hidden_fault_of_the_demonstration_is_found_at_its_size() -> None:
         assert abs(group.found - group.hidden) < 4 * group.std
 
 
-def effect(name: str, curve: Array, *span: Array) -> Curve:
-    return Curve(name, curve, np.stack([curve, *span], axis=2))
+def effect(name: str, curve: Array, *span: Array) -> OutputChange:
+    return OutputChange(name, curve, np.stack([curve, *span], axis=2))
 
 
 def test_a_fault_that_no_effect_follows_is_not_found() -> None:
     curves = np.eye(4)[:, :, None]
-    hidden, other = Curve("friction", curves[0]), effect("own", curves[1])
+    hidden, other = OutputChange("friction", curves[0]), effect("own", curves[1])
     groups, extra = group_steps([hidden], [other], 0.01)
     assert [g.effects for g in groups] == [()]
     assert extra == (other,)
@@ -68,7 +68,7 @@ def test_a_fault_that_no_effect_follows_is_not_found() -> None:
 
 def test_faults_that_share_an_effect_are_one_group_if_they_agree_together() -> None:
     x, y, z = np.eye(8)[:3, :, None]
-    hidden = [Curve("tilt", 2 * x), Curve("turn", x + y), Curve("friction", z)]
+    hidden = [OutputChange("tilt", 2 * x), OutputChange("turn", x + y), OutputChange("friction", z)]
     angle, zero = effect("angle", 2.9 * x, y), effect("zero", y)
     groups, extra = group_steps(hidden, [angle, zero], 0.01)
     assert [[f.name for f in g.faults] for g in groups if g.effects] == [["tilt", "turn"]]
@@ -78,8 +78,8 @@ def test_faults_that_share_an_effect_are_one_group_if_they_agree_together() -> N
     assert not any(g.effects for g in group_steps(hidden, [opposite, zero], 0.01)[0])
 
 
-def test_many_effects_of_a_group_stand_in_several_lines() -> None:
-    fault = Curve("tilt", np.ones((4, 1)))
+def test_many_effects_of_a_group_are_wrapped_over_several_lines() -> None:
+    fault = OutputChange("tilt", np.ones((4, 1)))
     effects = tuple(effect(f"effect-of-the-stage-{k}", np.ones((4, 1)), np.ones((4, 1))) for k in range(5))
     lines = Faults((Group((fault,), effects, 1.0),), (), 0.01, "V").text().splitlines()
     assert max(map(len, lines)) < 100
@@ -111,7 +111,7 @@ def _exists(path: str) -> bool:
 
 
 @pytest.mark.slow
-def test_the_demonstration_finds_what_was_hidden(rig: Rig, tmp_path: Path) -> None:
+def test_the_demonstration_finds_the_hidden_faults(rig: Rig, tmp_path: Path) -> None:
     document = rig("demo", "--folder", str(tmp_path / "demo"), "--json").document
     assert {row["fault"]: row["effect"] for row in document["hidden_faults"]} == SAME
     assert all(abs(row["found"] - row["size"]) < 4 * row["std"] for row in document["hidden_faults"])
@@ -122,7 +122,7 @@ def test_the_demonstration_finds_what_was_hidden(rig: Rig, tmp_path: Path) -> No
 
 
 @pytest.mark.release
-def test_the_realistic_demonstration_tells_what_it_did_not_find(rig: Rig, tmp_path: Path) -> None:
+def test_the_realistic_demonstration_names_the_faults_that_it_did_not_find(rig: Rig, tmp_path: Path) -> None:
     document = rig("demo", "--realistic", "--folder", str(tmp_path / "demo"), "--json").document
     rows = document["hidden_faults"]
     large = [row for row in rows if row["size_over_floor"] >= MATERIAL]

@@ -159,7 +159,7 @@ def test_a_few_poses_with_each_digital_sensor_keep_their_losses(
 
 @pytest.mark.sockets
 @pytest.mark.parametrize("driver", list(FRAMED))
-def test_a_procedure_that_needs_another_input_says_so(
+def test_a_procedure_that_needs_another_input_is_refused(
     rig: Rig, rig_home: Path, framed: Callable[..., str], driver: str
 ) -> None:
     ended = rig("run", "motion", "--bench", framed(driver), "--unattended")

@@ -70,7 +70,7 @@ def test_a_package_that_cannot_be_imported_is_named_in_an_archive(tmp_path: Path
         assert "error" in json.loads(file.read("bench.json"))
 
 
-def test_a_bench_goes_with_it_and_no_secret(rig: Rig, tmp_path: Path, bench_file: Any) -> None:
+def test_the_archive_has_the_bench_without_passwords(rig: Rig, tmp_path: Path, bench_file: Any) -> None:
     archive = tmp_path / "doctor.zip"
     assert rig("doctor", "--bench", str(bench_file({})), "--out", str(archive)).status == 0
     with zipfile.ZipFile(archive) as file:
@@ -91,7 +91,7 @@ def recorded(folder: Path, poses: int = 60) -> str:
     return run
 
 
-def test_a_sound_record_is_copied_whole(tmp_path: Path) -> None:
+def test_a_sound_record_is_copied_completely(tmp_path: Path) -> None:
     run = recorded(tmp_path / "old")
     done = recover(tmp_path / "old" / "record.db", tmp_path / "new")
     assert (done.damaged, done.spoilt) == ((), ())
@@ -103,7 +103,7 @@ def test_a_sound_record_is_copied_whole(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("page", [30, 45, 70])
-def test_of_a_damaged_record_is_read_what_can_be_and_what_is_lost_is_said(
+def test_the_readable_rows_of_a_damaged_record_are_copied_and_the_losses_are_reported(
     rig: Rig, rig_home: Path, tmp_path: Path, page: int
 ) -> None:
     run = recorded(rig_home)
@@ -130,7 +130,7 @@ def _kept(folder: Path, run: str) -> dict[int, KeptPose]:
         return {kept.number: kept for kept in record.kept(run) if kept.number is not None}
 
 
-def test_a_record_is_not_recovered_over_another_and_nothing_out_of_nothing(golden, tmp_path: Path) -> None:
+def test_a_recovery_does_not_replace_a_record_and_needs_a_readable_row(golden, tmp_path: Path) -> None:
     recorded(tmp_path / "old", 1)
     with golden.refused(RecordError):
         recover(tmp_path / "old" / "record.db", tmp_path / "old")

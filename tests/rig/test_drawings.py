@@ -24,7 +24,7 @@ ANGLES = product((-135.0, 0.0, 90.0, 180.0), (0.0, 200.0), (0.0, 45.0), (0, 1))
 EVERYWHERE = [*(Attitude(*angles) for angles in ANGLES), Attitude(45, 90, shaken=True)]
 
 
-def test_the_sensor_feels_what_the_geometry_says() -> None:
+def test_the_specific_force_agrees_with_the_geometry() -> None:
     for alpha, beta in product((-150.0, 0.0, 45.0, 90.0), (-30.0, 0.0, 90.0, 210.0)):
         a, b = np.radians([alpha, beta])
         wanted = np.sin(a) * np.cos(b), np.sin(a) * np.sin(b), np.cos(a)
@@ -72,7 +72,7 @@ def test_another_attitude_is_another_drawing() -> None:
     assert len({"".join(sketch(Attitude(0, 0, mount, flip))) for mount in (0, 30, 90, 180) for flip in (0, 1)}) == 8
 
 
-def test_only_faces_that_look_this_way_are_painted() -> None:
+def test_only_visible_faces_are_drawn() -> None:
     camera = Camera(CAMERA_FROM, 100, (0, 0))
     assert len(list(box((0, 0, 0), (1, 1, 1), np.eye(3), "#888888").drawn(camera))) == 3
     faces = list(cylinder(1, 0, 1, 2, np.eye(3), "#888888").drawn(camera))
@@ -101,7 +101,7 @@ def test_every_drawing_that_a_procedure_names_is_there(path: Path) -> None:
     assert set(re.findall(r'drawing="([^"]+)"', path.read_text(encoding="utf-8"))) <= set(NAMED)
 
 
-def test_the_command_writes_the_file_and_says_what_the_sensor_feels(rig: Rig, tmp_path: Path) -> None:
+def test_the_command_writes_the_file_and_prints_the_specific_force(rig: Rig, tmp_path: Path) -> None:
     out = tmp_path / "there.svg"
     ended = rig("draw", "--alpha", "45", "--beta", "90", "--mount", "0", "--flip", "0", "--out", str(out))
     assert ended.status == 0
@@ -117,7 +117,7 @@ def test_the_drawing_in_the_readme_is_todays() -> None:
     assert shown.read_text() == page(Attitude(45, 90)), "rig draw --alpha 45 --beta 90 --out docs/attitude.svg"
 
 
-def test_what_cannot_be_drawn_is_refused(rig: Rig, tmp_path: Path) -> None:
+def test_an_impossible_drawing_is_refused(rig: Rig, tmp_path: Path) -> None:
     assert "nan is not an angle" in rig("draw", "--alpha", "nan").err
     for name in ("a.pdf", "a"):
         ended = rig("draw", "--out", str(tmp_path / name))

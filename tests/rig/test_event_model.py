@@ -50,7 +50,7 @@ def test_every_document_is_valid(
     assert {name for name, _ in documents} == {"start", "descriptor", "event", "stop"}
 
 
-def test_bluesky_reads_what_the_table_holds(exported: Callable[[str], list[tuple[str, Any]]]) -> None:
+def test_bluesky_reads_the_values_of_the_table(exported: Callable[[str], list[tuple[str, Any]]]) -> None:
     with Record() as record:
         run = a_run(record)
         table = table_of(record, run)

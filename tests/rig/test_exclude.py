@@ -37,7 +37,7 @@ def events(run: str) -> list[tuple[str, str]]:
         return [(event.what, event.text) for event in record.events(run)]
 
 
-def test_results_are_those_of_the_other_poses_and_come_back(rig: Rig, run: str) -> None:
+def test_results_are_computed_from_the_other_poses_and_restored(rig: Rig, run: str) -> None:
     before = results(run)
     ended = rig("exclude", run, "5", "--reason", "a lorry passed", "--json")
     document = ended.document
@@ -65,7 +65,7 @@ def test_an_exclusion_is_confirmed_in_words(rig: Rig, run: str) -> None:
     assert rig("exclude", run, "5", "--include").out.startswith(f"{run}: pose 5 included again")
 
 
-def test_what_the_other_poses_still_determine_is_given_and_the_rest_is_named(rig: Rig, run: str) -> None:
+def test_results_that_the_other_poses_determine_are_given_and_the_others_are_named(rig: Rig, run: str) -> None:
     before = results(run)
     said = rig("exclude", run, "0", "--reason", "x").out
     assert "results: no inclination-x: there is no pose at alpha 90, beta 0 deg" in said
@@ -81,7 +81,7 @@ def test_poses_that_do_not_determine_the_results_leave_none(rig: Rig, run: str) 
     assert rig("show", run).status == 0
 
 
-def test_even_without_any_pose_it_can_be_shown(rig: Rig) -> None:
+def test_a_run_without_poses_can_be_shown(rig: Rig) -> None:
     with Record() as record:
         run = start(record, *_small()).run.run
         for number in range(POSES):
@@ -111,7 +111,7 @@ def test_a_stopped_run_measures_the_pose_again(rig: Rig) -> None:
         assert table_of(record, stopped.run).n == done.run.rows - 1
 
 
-def test_what_the_procedure_gave_itself_stays(tmp_path: Path) -> None:
+def test_results_that_the_procedure_returned_stay(tmp_path: Path) -> None:
     from procedures.catalogue import find
     from rig.bench import read_bench
 
@@ -154,7 +154,7 @@ def imported(rig: Rig, tmp_path: Path) -> str:
     return str(rig("import", str(file), "--json").document["run"])
 
 
-def test_a_row_of_an_imported_table_is_left_out_and_comes_back(rig: Rig, imported: str) -> None:
+def test_a_row_of_an_imported_table_is_excluded_and_included_again(rig: Rig, imported: str) -> None:
     with Record() as record:
         whole = table_of(record, imported)
         assert exclude(record, imported, [2], "bumped").results == {}
@@ -173,11 +173,11 @@ def test_a_row_of_an_imported_table_is_left_out_and_comes_back(rig: Rig, importe
 
 
 @pytest.mark.parametrize(("row", "status"), [("3", 0), ("4", 2)])
-def test_only_a_row_of_the_table_can_be_left_out(rig: Rig, imported: str, row: str, status: int) -> None:
+def test_only_a_row_of_the_table_can_be_excluded(rig: Rig, imported: str, row: str, status: int) -> None:
     assert rig("exclude", imported, row, "--reason", "x").status == status
 
 
-def test_without_any_row_an_imported_table_names_the_way_back(rig: Rig, imported: str) -> None:
+def test_an_imported_table_without_any_row_names_the_command_to_include_one(rig: Rig, imported: str) -> None:
     with Record() as record:
         exclude(record, imported, range(4), "all wrong")
     ended = rig("fit", imported, "--model", "linear")
@@ -195,7 +195,7 @@ def test_a_single_sample_of_an_imported_record_cannot_be_left_out(rig: Rig, tmp_
     assert "is an imported table of still: its rows are samples" in ended.err
 
 
-def test_a_run_that_goes_on_is_left_alone(rig: Rig, run: str) -> None:
+def test_poses_of_a_run_in_progress_are_not_excluded(rig: Rig, run: str) -> None:
     with Record() as record, lease(record.folder, run, "it"):
         ended = rig("exclude", run, "1", "--reason", "x")
     assert ended.status == 2

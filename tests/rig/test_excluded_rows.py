@@ -15,7 +15,7 @@ from tests.rig.conftest import Rig
 ROWS = ["alpha_deg,beta_deg,vx_v,excluded", "90,0,3.5,0", "90,90,9.9,1", "90,180,1.5,0"]
 
 
-def test_rows_that_the_file_excludes_are_left_out_and_that_is_said(tmp_path: Path) -> None:
+def test_rows_that_the_file_excludes_are_left_out_with_a_remark(tmp_path: Path) -> None:
     file, said = tmp_path / "knocked.csv", []
     file.write_text("\n".join(ROWS))
     table = load(str(file), notify=said.append)
@@ -31,7 +31,7 @@ def test_a_file_cannot_exclude_all(golden, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["compare", "fit"])
-def test_a_fit_of_all_rows_names_those_that_stand_out(command: str, tmp_path: Path, rig: Rig) -> None:
+def test_a_fit_of_all_rows_names_the_outliers(command: str, tmp_path: Path, rig: Rig) -> None:
     columns = turns(step_deg=30.0)
     x, y, _ = components(columns)
     volts = 2.5 + x
@@ -39,5 +39,6 @@ def test_a_fit_of_all_rows_names_those_that_stand_out(command: str, tmp_path: Pa
     write_csv(poses(columns, volts, 2.5 + y), tmp_path / "knocked.csv")
     said = rig(command, str(tmp_path / "knocked.csv"), "--model", "linear")
     assert said.status == 0
-    assert "1 pose stands out: #7 (counted from 0, including excluded poses), still in this fit" in said.out
+    outlier = "1 pose differs from the others: #7 (counted from 0, including excluded poses), still in this fit"
+    assert outlier in said.out
     assert "rig exclude" in said.out

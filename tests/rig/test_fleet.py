@@ -89,7 +89,7 @@ def test_the_rig_in_error_and_the_strange_sensor_are_found_and_bad_files_are_lis
     assert all(word in page for word in ("stage-eccentricity", "S4", "temperature-bias", "gone.csv"))
 
 
-def test_what_the_record_knows_is_not_worked_out_again(
+def test_answers_in_the_record_are_not_computed_again(
     discovered: Mapping[str, Any], folder: Path, home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rig.fleet.questions.run_tasks", lambda *_: pytest.fail("asked again"))
@@ -99,7 +99,7 @@ def test_what_the_record_knows_is_not_worked_out_again(
     assert [each.verdict for each in again.sensors] == [each["verdict"] for each in discovered["sensors"][:12]]
 
 
-def test_calibrate_goes_by_the_discovered_models_and_writes_each_sensors(
+def test_calibrate_uses_the_discovered_models_and_writes_one_for_each_sensor(
     discovered: Mapping[str, Any], cluster: LocalCluster, folder: Path, home: Path, rig: Command
 ) -> None:
     address = cluster.scheduler_address
@@ -118,7 +118,7 @@ def test_calibrate_goes_by_the_discovered_models_and_writes_each_sensors(
     assert (home / "calibrated.html").stat().st_size > 5_000
 
 
-def test_answers_are_kept_as_they_come(cluster: LocalCluster, folder: Path, tmp_path: Path) -> None:
+def test_answers_are_stored_as_they_arrive(cluster: LocalCluster, folder: Path, tmp_path: Path) -> None:
     """Who is stopped in the middle, or loses the scheduler, goes on where the last answers came."""
     members = [m for m in fleet_of([str(folder)]) if m.fault is None][:3]
     asked = [(member, Question("diagnosis", LINEAR)) for member in members]
@@ -202,7 +202,7 @@ def numbered(tasks: list[int]) -> list[int]:
     return tasks
 
 
-def test_a_lost_scheduler_says_how_to_go_on() -> None:
+def test_the_message_about_a_lost_scheduler_says_how_to_continue() -> None:
     with (
         dask.config.set({"distributed.comm.timeouts.connect": "0.5 s"}),
         LocalCluster(
@@ -241,7 +241,7 @@ def test_members_of_files_folders_and_runs(tmp_path: Path, monkeypatch: pytest.M
         fleet_of([str(tmp_path / "index.csv")])
 
 
-def test_a_look_is_written_and_read_to_the_last_bit() -> None:
+def test_a_screening_is_written_and_read_bit_for_bit() -> None:
     from calibrations.fleet.look import SharedDesigns, screen_sensor
 
     found = screen_sensor(sensor(1), read_model("linear"), SharedDesigns({}))

@@ -105,7 +105,7 @@ def test_rates_and_positions_are_looked_at_and_diagnosed(
     assert asked(table(), model, tmp_path, "diagnosis")["effects"]
 
 
-def test_of_positions_and_rates_no_columns_are_shared(tmp_path: Path) -> None:
+def test_positions_and_rates_have_no_common_columns(tmp_path: Path) -> None:
     """Two gyroscopes on one program of rates, one of them leaning: each has its own statistics."""
     first, table = turned.gyroscope(1), turned.gyroscope(2, lean_deg=2.0)
     model, effects = read_model("gyroscope"), catalogue()
@@ -117,7 +117,7 @@ def test_of_positions_and_rates_no_columns_are_shared(tmp_path: Path) -> None:
     assert statistics == pytest.approx(own, rel=1e-6, abs=1e-3)
 
 
-def test_what_a_fleet_cannot_judge_is_said_with_the_way_to_judge_it(golden, tmp_path: Path) -> None:
+def test_a_table_that_a_fleet_cannot_judge_gets_a_command_that_can(golden, tmp_path: Path) -> None:
     still = Table.from_columns("still", {"t_s": np.arange(9.0), "vx_v": np.arange(9.0)}, source="S.csv")
     for table in (still, turned.ferraris()):
         golden.same(asked(table, "linear", tmp_path)["fault"])
@@ -170,7 +170,7 @@ def test_an_effect_that_others_make_needless_is_dropped() -> None:
     assert ("second", "third") in told.asked
 
 
-def test_effects_that_are_all_needed_stay() -> None:
+def test_effects_that_are_all_needed_remain() -> None:
     found, told = effects_found({(): {"first": 50.0, "second": 20.0}, ("first",): {"second": 20.0},
                                  ("second",): {"first": 40.0}})  # fmt: skip
     assert found == ["first", "second"]
@@ -183,7 +183,7 @@ def test_effects_that_are_all_needed_stay() -> None:
     ]
 
 
-def test_what_the_record_knows_passes_through_in_slices(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_answers_in_the_record_are_read_in_slices(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked_for: list[int] = []
 
     def kept(_record: Record, keys: Sequence[str]) -> dict[str, Any]:
@@ -200,12 +200,12 @@ def test_what_the_record_knows_passes_through_in_slices(tmp_path: Path, monkeypa
     assert sum(1 for _ in answers) == 599
 
 
-def test_the_page_does_not_say_that_all_is_done_while_it_works() -> None:
+def test_the_page_shows_no_completion_during_the_work() -> None:
     assert progress_text("fitting the sensors", 3, 4) == "Fitting the sensors: 3 of 4 sensors"
     assert progress_text("fitting the sensors", 4, 4) == "Fitting the sensors: evaluating the answers"
 
 
-def test_copies_of_a_table_are_one_question_and_each_has_its_answer(cluster: LocalCluster, tmp_path: Path) -> None:
+def test_copies_of_a_table_are_computed_once_and_each_gets_the_answer(cluster: LocalCluster, tmp_path: Path) -> None:
     for name in ("one", "two"):
         write_csv(sensor(1), tmp_path / f"{name}.csv")
     one, two = fleet_of([str(tmp_path)])

@@ -41,7 +41,7 @@ class FakeClock:
         return False
 
 
-def test_a_sleep_looks_about_and_ends_when_it_should() -> None:
+def test_a_sleep_calls_the_checks_and_ends_on_time() -> None:
     clock, seen = GuardedClock(FakeClock()), []
     with clock.guarded([Look(lambda: seen.append(clock.now()))]):
         clock.sleep(1.0)
@@ -52,7 +52,7 @@ def test_a_sleep_looks_about_and_ends_when_it_should() -> None:
     assert len(seen) == 24
 
 
-def test_many_short_sleeps_are_looked_at_as_one_long_one() -> None:
+def test_many_short_sleeps_have_the_checks_of_one_long_sleep() -> None:
     clock, seen = GuardedClock(FakeClock()), []
     with clock.guarded([Look(lambda: seen.append(clock.now()))]):
         while clock.now() < 1.0:
@@ -60,7 +60,7 @@ def test_many_short_sleeps_are_looked_at_as_one_long_one() -> None:
     assert seen == pytest.approx([WATCH_S * k for k in range(1, 26)])
 
 
-def test_a_sleep_that_is_part_of_an_exchange_does_not_look_about() -> None:
+def test_a_sleep_within_an_exchange_calls_no_check() -> None:
     clock, seen = GuardedClock(FakeClock()), []
     with clock.guarded([Look(lambda: seen.append(1), every_s=0.001)]):
         for _ in range(100):
@@ -68,7 +68,7 @@ def test_a_sleep_that_is_part_of_an_exchange_does_not_look_about() -> None:
     assert not seen
 
 
-def test_a_look_that_waits_does_not_look_about_itself() -> None:
+def test_a_check_that_waits_does_not_start_another_check() -> None:
     clock, depth, deepest = GuardedClock(FakeClock()), 0, 0
 
     def look() -> None:
@@ -83,7 +83,7 @@ def test_a_look_that_waits_does_not_look_about_itself() -> None:
     assert deepest == 1
 
 
-def test_what_takes_time_waits_for_a_sleep_that_has_it() -> None:
+def test_a_check_that_takes_time_waits_for_a_long_sleep() -> None:
     clock, seen = GuardedClock(FakeClock()), []
     with clock.guarded([Look(lambda: seen.append(clock.now()), every_s=1.0, takes_s=0.5)]):
         for _ in range(10):
@@ -93,7 +93,7 @@ def test_what_takes_time_waits_for_a_sleep_that_has_it() -> None:
     assert seen == [pytest.approx(5.0)]
 
 
-def test_what_is_found_is_raised_and_not_looked_for_again() -> None:
+def test_the_error_of_a_check_is_raised_once() -> None:
     clock = GuardedClock(FakeClock())
 
     def look() -> None:
@@ -146,7 +146,7 @@ def test_a_stop_is_on_the_wire_within_a_tenth_of_a_second(role: str, fault: Faul
 
 @pytest.mark.slow
 @pytest.mark.sockets
-def test_a_run_that_was_stopped_by_an_interlock_goes_on_as_if_nothing_had_been() -> None:
+def test_a_run_stopped_by_an_interlock_continues_and_equals_an_undisturbed_run() -> None:
     bench = guarded_bench()
     with Record() as record:
         stopped = short(record, afflicted(bench, "adc", Fault("open-interlock", at_s=26.6)), "sweep", **TINY)
@@ -166,7 +166,7 @@ def test_a_run_does_not_begin_while_an_interlock_is_open() -> None:
 
 
 @pytest.mark.sockets
-def test_an_oven_that_runs_away_is_noticed_while_the_run_waits() -> None:
+def test_an_oven_above_its_limit_is_noticed_while_the_run_waits() -> None:
     """Half an hour of soaking: the heater is off when it has become too hot, not at the end."""
     with Record() as record, looking_on() as aftermath:
         bench = afflicted(watched_bench(), "oven", Fault("runaway", at_s=100.0))

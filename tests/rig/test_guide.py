@@ -90,7 +90,7 @@ def planned(name: str = "sweep", bench: Bench | None = None) -> Plan:
     return plan(bench or read_bench(), procedure, procedure.defaults)
 
 
-def test_before_a_run_one_screen_says_all_of_it() -> None:
+def test_one_screen_shows_the_whole_plan_before_a_run() -> None:
     text = shown(screen_before_run(planned(), SWEEP, read_bench(), 2_000_000_000, TODAY))
     for piece in (
         "Hold the sensor at a grid of stage angles, in both directions of beta.",
@@ -109,11 +109,11 @@ def test_before_a_run_one_screen_says_all_of_it() -> None:
     assert len(text.splitlines()) < 35
 
 
-def test_a_disk_that_is_too_small_is_said() -> None:
+def test_the_plan_names_a_disk_that_is_too_small() -> None:
     assert "not enough space" in shown(screen_before_run(planned(), SWEEP, read_bench(), 1000, TODAY))
 
 
-def test_the_page_says_it_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_page_shows_the_same_plan(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rig.web.pages.run_begin.free_bytes", lambda _: 1000)
     assert plan_facts(planned(), read_bench())["Stores"].endswith("on the disk; 1.0 kB are free: not enough space")
 
@@ -146,14 +146,14 @@ def test_the_page_shows_before_a_resume_what_remains_with_the_same_limits() -> N
     assert whole.after(run.rows).duration_s + whole.held[run.rows].start_s == whole.duration_s
 
 
-def test_a_certificate_that_is_expired_is_said() -> None:
+def test_the_plan_names_an_expired_certificate() -> None:
     document = read_bench().document()
     document["certificates"] = {"hand level": {"number": "L-7", "due": "2026-11-20"}}
     text = shown(screen_before_run(planned(), SWEEP, Bench.model_validate(document), 10**9, TODAY))
     assert "hand level's certificate L-7 expired on 2026-11-20" in text
 
 
-def test_what_to_check_follows_from_the_plan() -> None:
+def test_the_checks_before_a_run_follow_from_the_plan() -> None:
     document = read_bench().document()
     del document["instruments"]["level"]
     assert any("you will read it" in line for line in checks(planned("sweep", Bench.model_validate(document))))
@@ -209,7 +209,7 @@ def seen(**changes: Any) -> RunView:
     return replace(RunView("sweep", Limits(level_deg=0.3), 10.0, False, lambda _: "V"), **changes)
 
 
-def test_values_stand_between_their_limits_and_are_marked_near_them() -> None:
+def test_values_are_shown_between_their_limits_and_marked_near_them() -> None:
     text = shown(screen(seen(kept=kept(1)), 0.0))
     assert "near" not in text
     assert "28.3 C     -20 ├" in text
@@ -258,7 +258,7 @@ def test_a_gauge_has_its_mark_where_the_value_is(value: float, near: str, place:
     assert nearness(value, -1.0, 1.0) == near
 
 
-def test_what_is_no_number_is_beyond_its_limit() -> None:
+def test_nan_is_beyond_its_limit() -> None:
     assert nearness(float("nan"), -1.0, 1.0) == "beyond its limit"
     assert gauge(float("nan"), -1.0, 1.0).plain.index("●") == WIDTH - 2
 
@@ -266,7 +266,7 @@ def test_what_is_no_number_is_beyond_its_limit() -> None:
 # time left
 
 
-def test_time_left_is_that_of_the_plan_until_there_is_a_pace() -> None:
+def test_the_remaining_time_is_that_of_the_plan_before_the_first_pose() -> None:
     way = Progress(at_s=(10.0, 20.0, 90.0), end_s=100.0).begin(0.0).expect(3, 0)
     assert (way.planned_left_s(), way.left_s(5.0)) == (90.0, None)
     one = way.step(2.0)  # ten planned seconds took two
@@ -288,7 +288,7 @@ def test_a_procedure_that_expects_part_by_part_has_the_plans_total() -> None:
     assert Progress().begin(0.0).expect(4, 0).step(1.0).expect(10, 4).first == 0
 
 
-def test_simulated_time_is_said_to_be_that() -> None:
+def test_simulated_time_is_called_simulated() -> None:
     way = Progress(at_s=(10.0,), end_s=60.0).expect(1, 0)
     assert "0:50 left, as planned" in shown(screen(seen(progress=way), 0.0))
     assert "0:50 of simulated time left, as planned" in shown(screen(seen(progress=way, simulated=True), 0.0))
@@ -306,7 +306,7 @@ def test_a_person_is_asked_unless_the_file_answers(said: Callable[..., None]) ->
         assert shown_to.ask(MOUNTED, "yes") == "no"
 
 
-def test_a_person_is_asked_until_the_answer_makes_sense(said: Callable[..., None]) -> None:
+def test_a_question_is_repeated_until_the_answer_is_valid(said: Callable[..., None]) -> None:
     said("much", "90", "0,2")
     shown_to, told = guide()
     with shown_to:
@@ -324,7 +324,7 @@ def test_a_question_has_its_drawing_once(said: Callable[..., None], rig_home: Pa
     assert (rig_home / "drawings" / "mount-90-down.svg").read_text() == page(Attitude(0, 0, 90, 1))
 
 
-def test_a_terminal_that_closes_is_nobody(golden, said: Callable[..., None]) -> None:
+def test_a_closed_terminal_gives_no_answer(golden, said: Callable[..., None]) -> None:
     said()
     with guide()[0] as shown_to, golden.refused(NoAnswer):
         shown_to.ask(MOUNTED, "yes")
@@ -339,7 +339,7 @@ def outcome() -> Iterator[Outcome]:
         yield Outcome(record.run(run), Stopped("stopped by a person"), ("alpha may still move: silence",))
 
 
-def test_the_menu_says_what_each_answer_means(said: Callable[..., None], outcome: Outcome, run: str) -> None:
+def test_the_menu_explains_each_answer(said: Callable[..., None], outcome: Outcome, run: str) -> None:
     said("go", "repeat")
     shown_to, told = guide()
     with shown_to:
@@ -360,7 +360,7 @@ def test_the_menu_says_what_each_answer_means(said: Callable[..., None], outcome
 # nobody
 
 
-def test_who_is_not_at_a_terminal_is_not_asked(outcome: Outcome) -> None:
+def test_no_question_is_asked_without_a_terminal(outcome: Outcome) -> None:
     with watching(SWEEP, read_bench(), unattended=False, answers=None) as watch:
         watch.planned(planned())
         assert watch.interrupted(outcome) == "end"
@@ -380,7 +380,7 @@ def test_times_and_sizes_read_well() -> None:
     assert [size(n) for n in (512, 3_400_000, 80_700_000_000)] == ["0.5 kB", "3.4 MB", "80.7 GB"]
 
 
-def test_columns_stand_under_each_other() -> None:
+def test_columns_of_a_table_are_aligned() -> None:
     assert columns(("run", "poses"), [("a", 518), ("long", 2)]) == "run   poses\na     518\nlong  2"
 
 

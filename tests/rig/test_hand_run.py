@@ -145,7 +145,7 @@ def test_a_run_finds_the_scale_factors_and_the_misalignment_of_a_gyroscope(
 
 @pytest.mark.slow
 @pytest.mark.sockets
-def test_turns_that_were_interrupted_go_on(rig_home: Path) -> None:
+def test_interrupted_turns_continue(rig_home: Path) -> None:
     procedure, bench = find("hand-turns"), read_bench(HAND)
 
     class Interrupting(Onlooker):
@@ -178,7 +178,9 @@ def test_a_bench_without_the_sensor_is_refused(rig: Rig, rig_home: Path, tmp_pat
         assert f"adc: no input is wired to {missing}; there are ax, ay, az" in ended.err
 
 
-def test_a_gyroscope_without_an_accelerometer_is_led_to_whole_turns(rig: Rig, rig_home: Path, tmp_path: Path) -> None:
+def test_a_gyroscope_without_an_accelerometer_gets_the_advice_of_whole_turns(
+    rig: Rig, rig_home: Path, tmp_path: Path
+) -> None:
     document = yaml.safe_load(HAND.read_text(encoding="utf-8"))
     settings = document["instruments"]["adc"]["settings"]
     inputs = {**settings["channels"], **settings["on_request"]}
@@ -195,7 +197,7 @@ def test_a_gyroscope_without_an_accelerometer_is_led_to_whole_turns(rig: Rig, ri
 
 @pytest.mark.slow
 @pytest.mark.sockets
-def test_a_stopped_run_goes_on_with_its_positions(rig_home: Path) -> None:
+def test_a_stopped_run_continues_with_its_positions(rig_home: Path) -> None:
     procedure, bench = find("hand-positions"), read_bench(HAND)
 
     class Interrupting(Onlooker):
@@ -220,7 +222,7 @@ def test_a_stopped_run_goes_on_with_its_positions(rig_home: Path) -> None:
 def test_an_accuracy_that_was_not_reached_is_a_result_that_is_missing(rig: Rig, rig_home: Path) -> None:
     ended = rig(*RUN, "--target-g", "1e-6", "--most-positions", "12")
     assert ended.status == 1
-    assert "mg only, wanted 0.001 mg; take more positions, or longer rests" in ended.err
+    assert "mg, target 0.001 mg; take more positions, or longer rests" in ended.err
     assert "uncertainty" not in ended.document["results"]
 
 
@@ -229,10 +231,10 @@ def test_a_target_that_is_reached_within_the_error_of_an_uncertainty_is_reached(
     percent: float, is_reached: bool
 ) -> None:
     measured = cast(MeasuredRun, SimpleNamespace(run=SimpleNamespace(settings={"target_percent": 0.2})))
-    known = f"gyro-scale-factor.x is known to {percent:g} % only"
-    found = _uncertainty(measured, percent, known, "turns", TARGET_PERCENT)["uncertainty"]
+    reached = f"gyro-scale-factor.x: standard uncertainty {percent:g} %"
+    found = _uncertainty(measured, percent, reached, "turns", TARGET_PERCENT)["uncertainty"]
     assert found == (
-        Result(percent, "%") if is_reached else Missing(f"{known}, wanted 0.2 %; take more turns, or longer rests")
+        Result(percent, "%") if is_reached else Missing(f"{reached}, target 0.2 %; take more turns, or longer rests")
     )
 
 
@@ -298,7 +300,7 @@ def test_a_digital_unit_is_calibrated_in_its_own_units(
     assert ended.done().document["results"][found_name]["unit"] == unit
 
 
-def test_a_digital_sensor_records_the_outputs_of_two_sensors_for_who_asks() -> None:
+def test_a_digital_sensor_records_the_outputs_of_two_sensors_on_request() -> None:
     settings = Settings(columns={name: k + 1 for k, name in enumerate(INPUTS)})
     assert list(settings.channels) == ["ax", "ay", "az"]
     assert list(settings.only("adc", INPUTS[:6]).channels) == list(INPUTS[:6])

@@ -27,6 +27,7 @@ from rig.services.history import (
     type_of,
 )
 from rig.services.history_comparison import compare_rigs
+from rig.services.history_words import next_due
 from tests.rig.conftest import Rig
 from tests.rig.lives import COLUMNS, calibrated
 
@@ -69,14 +70,14 @@ def test_the_document_of_a_history_has_its_figures(rig: Rig, years: None) -> Non
     assert (still["allowed"], still["due"]) == (None, None)
 
 
-def test_the_closest_to_a_day_and_whether_it_is_stale(rig: Rig, years: None) -> None:
+def test_the_calibration_closest_to_a_day_is_shown_with_its_staleness(rig: Rig, years: None) -> None:
     fresh = rig("history", "17", "--at", "2022-05-01")
     assert (fresh.status, "Closest to 2022-05-01" in fresh.out, "61 days before" in fresh.out) == (0, True, True)
     near = [rig("history", "17", "--at", f"2022-03-0{day}").out for day in (1, 2)]
     assert [end in out for end, out in zip((", the same day.", ", 1 day before."), near, strict=True)] == [True, True]
     old = rig("history", "17", "--at", "2026-01-01")
     assert old.status == 1
-    assert "This calibration is stale: it is 671 days older than that day." in old.out
+    assert "This calibration is stale: it was measured 671 days before that day." in old.out
     due = rig("history", "17", "--at", "2024-12-01", "--limit", "bias-x=0.0003")
     assert "This calibration is stale: it was due on 2024" in due.out
 
@@ -91,7 +92,9 @@ def test_sensors_and_dates_are_compared(rig: Rig, years: None) -> None:
     assert rig("history", "17", "--beside", "18", "--quantity", "bias-y").status == 0
 
 
-def test_of_the_other_sensor_the_last_calibration_alone_is_made(years: None, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_comparison_computes_only_the_last_calibration_of_the_other_sensor(
+    years: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     fitted: list[str] = []
 
     def noted(model: Model, table: Table) -> Fit:
@@ -137,6 +140,29 @@ def test_a_later_poor_calibration_does_not_widen_the_limits_of_the_chart() -> No
     assert after.signals == [3, 4]  # a jump, and then the weighted mean is still outside its limit
 
 
+def test_a_limited_quantity_without_a_drift_has_no_due_date() -> None:
+    """bias-y is in two of five calibrations only; the drift of bias-x, which has no limit, says nothing about it."""
+    start, value = datetime(2025, 1, 1, tzinfo=UTC), ParameterValue(2.5, 1e-4, "V")
+    found = tuple(
+        Calibration(
+            f"r{k}",
+            start + timedelta(days=100 * k),
+            "A",
+            {"bias-x": value} | ({"bias-y": value} if k > 2 else {}),
+            None,
+        )
+        for k in range(5)
+    )
+    life = History("17", "linear", found, (), {})
+    assert next_due(judge_history(life, {"bias-y": 0.005}), "") == (
+        "A due date needs 3 calibrations at different times."
+    )
+    assert next_due(judge_history(life, {"bias-x": 0.005, "bias-y": 0.005}), "") == (
+        "A due date of bias-y needs 3 calibrations at different times."
+    )
+    assert next_due(judge_history(life, {"bias-x": 0.005}), "").startswith("With this drift no calibration is due")
+
+
 def _calibration(start: datetime, day: int, value: float, std: float) -> Calibration:
     return Calibration(f"r{day}", start + timedelta(days=day), "A", {"bias-x": ParameterValue(value, std, "V")}, None)
 
@@ -165,14 +191,14 @@ def test_a_run_of_a_batch_is_a_calibration_of_each_sensor(rig: Rig, bench_file: 
         assert only["rig"] == "the rig in the cellar"
 
 
-def test_a_run_leads_to_the_life_of_its_sensor(rig: Rig, years: None) -> None:
+def test_a_run_names_the_history_of_its_sensor(rig: Rig, years: None) -> None:
     shown = {run["run"]: rig("show", run["run"]).out for run in rig("runs", "--json").document["runs"]}
     said = "The record has 5 calibration runs of the sensor 17: rig history 17"
     assert sum(said in text for text in shown.values()) == 5
     assert sum("rig history 18" in text for text in shown.values()) == 0  # one run makes no life
 
 
-def test_what_is_no_calibration_is_passed_over_and_said(rig: Rig, years: None) -> None:
+def test_a_run_that_is_no_calibration_is_passed_over_with_the_reason(rig: Rig, years: None) -> None:
     with Record() as record:
         columns = {name: values[:2] for name, values in COLUMNS.items()} | {"vx_v": [1.0, 2.0]}
         short = Table.from_columns("poses", columns, {"serial": "17"}, "short")
@@ -236,7 +262,7 @@ def test_calibrations_of_another_kind_or_by_an_incomplete_model_are_not_compared
     assert "not complete for 1 of 3" in life.warnings[0]
 
 
-def test_a_sensor_has_its_type_beside_its_serial_number(years: None) -> None:
+def test_a_sensor_is_shown_with_its_type_and_its_serial_number(years: None) -> None:
     with Record.to_read() as record:
         run = record.runs()[0]
     assert type_of("17", replace(run, constants={"serial": "17", "sensor": "ADXL203"})) == "ADXL203"

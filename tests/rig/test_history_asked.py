@@ -26,7 +26,7 @@ def test_an_address_is_read_as_it_was_written(whole: HistoryRequest) -> None:
     assert parse_request(QueryParams(query)) == whole
 
 
-def test_what_is_as_by_default_is_not_in_the_address() -> None:
+def test_default_values_are_not_in_the_address() -> None:
     assert HistoryRequest("17", at=date.fromisoformat(today())).address == "/history?sensor=17"
 
 
@@ -39,6 +39,6 @@ def test_what_is_as_by_default_is_not_in_the_address() -> None:
         ("at=monday", "'monday' is not a date: write it like 2"),
     ],
 )
-def test_an_address_that_asks_nothing_that_can_be_answered(query: str, told: str) -> None:
+def test_an_invalid_request_in_an_address_is_refused(query: str, told: str) -> None:
     with pytest.raises(RigError, match=told):
         parse_request(QueryParams(query))

@@ -70,7 +70,7 @@ def press_ctrl_c(terminal: pexpect.spawn[str]) -> None:
     raise AssertionError("Ctrl-C was not heard")
 
 
-def test_who_gives_up_has_imported_nothing(file: Path) -> None:
+def test_an_aborted_import_stores_nothing(file: Path) -> None:
     with at_terminal(file) as terminal:
         terminal.expect(r"\[poses\]: ")
         press_ctrl_c(terminal)
@@ -109,7 +109,7 @@ POSES = "alpha_deg,beta_deg,vx_v,vy_v,time,pressure\n" + "\n".join(
 )
 
 
-def test_the_terminal_takes_what_the_page_proposes_for_further_columns(tmp_path: Path, rig: Rig) -> None:
+def test_the_terminal_uses_the_proposals_of_the_page_for_further_columns(tmp_path: Path, rig: Rig) -> None:
     (path := tmp_path / "poses.csv").write_text(POSES.format(times=[10 * k for k in range(36)]))
     page = {m.file_column: m.name for m in proposal(open_file(path)).columns.values() if m is not None}
     assert page["time"] == "t_s"

@@ -92,7 +92,7 @@ def test_a_kill_inside_a_transaction(
 
 
 @pytest.mark.slow
-def test_whole_processes_killed_while_they_start(nursery: Nursery, whole: Undisturbed, rig_home: Path) -> None:
+def test_processes_are_killed_during_their_start(nursery: Nursery, whole: Undisturbed, rig_home: Path) -> None:
     luck, seen = random.Random(1), Story().seen[-1]
     for _ in range(3):
         words = ("resume", seen.run, "--unattended") if seen.run else RUN

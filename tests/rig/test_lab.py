@@ -109,7 +109,7 @@ def test_a_user_with_read_permission_writes_nothing(reader: str, writer: str, ri
         assert lab.excluded(run) == {3: "a lorry"}
 
 
-def test_a_rig_that_is_offline_goes_on_and_catches_up(
+def test_a_rig_that_is_offline_pushes_its_runs_later(
     rig: Rig, bench_file: Callable[..., Path], server: Server, database: str
 ) -> None:
     away = f"postgresql://rig7@127.0.0.1:{free_port()}/rigs"
@@ -174,7 +174,7 @@ def test_a_password_is_stored_and_printed_nowhere(
         assert WORD not in str([held(record, kept.run) for kept in record.runs()])
 
 
-def test_where_runs_are_pushed_is_no_part_of_what_they_depend_on(bench_file: Callable[..., Path]) -> None:
+def test_the_configuration_of_a_run_does_not_include_the_lab(bench_file: Callable[..., Path]) -> None:
     lab = {"url": "postgresql://rig7@lab.example/rigs", "push": True}
     with_lab, without = (read_bench(bench_file({"lab": each})).configuration("sweep", {}) for each in (lab, None))
     assert with_lab == without
@@ -200,7 +200,7 @@ def test_a_database_is_prepared_once_and_brought_up_to_date(server: Server, rig:
         assert f"of a newer version of this program (schema {SCHEMA + 1}" in rig(*words).err
 
 
-def test_verify_says_what_has_changed(rig: Rig, server: Server, database: str) -> None:
+def test_verify_names_the_changed_runs(rig: Rig, server: Server, database: str) -> None:
     with Record() as own:
         run = a_run(own)
     url = server.url(database)

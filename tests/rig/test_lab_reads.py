@@ -130,7 +130,7 @@ def test_a_command_prints_and_writes_the_same_from_either_record(
     both(*(word.format(run, **laboratory.runs) for word in words), *json)
 
 
-def test_a_fleet_is_read_there_and_its_answers_are_kept_here(
+def test_a_fleet_is_read_in_the_lab_and_its_answers_are_stored_on_the_rig(
     both: Callable[..., None], laboratory: Laboratory, monkeypatch: pytest.MonkeyPatch, rig_home: Path
 ) -> None:
     monkeypatch.setattr("rig.cli.commands.fleet.connect_workers", lambda *_: nullcontext())

@@ -61,7 +61,7 @@ def test_a_server_of_another_root_or_name_is_refused(
         assert "Give the certificate of the server's signer in sslrootcert" in ended.err
 
 
-def test_another_machine_is_not_spoken_to_in_plain_text_unless_somebody_says_so(
+def test_a_connection_to_another_machine_is_encrypted_unless_the_user_sets_another_mode(
     rig: Rig, server: Server, database: str
 ) -> None:
     asked: list[bytes] = []
@@ -78,7 +78,7 @@ def test_another_machine_is_not_spoken_to_in_plain_text_unless_somebody_says_so(
         assert rig("runs", "--record", f"{url}&sslmode=disable").status == 0
 
 
-def test_which_machine_is_another_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_addresses_of_this_machine_need_no_encryption(monkeypatch: pytest.MonkeyPatch) -> None:
     def mode(url: str) -> str | None:
         return options(lab_url(url)).get("sslmode")
 

@@ -125,7 +125,7 @@ def test_the_page_shows_the_history_in_the_laboratory(
     visiting("/history?sensor=ADXL203", visit)
 
 
-def test_who_may_only_read_is_told_so_and_nothing_is_written(
+def test_a_role_that_may_only_read_gets_a_message_and_writes_nothing(
     run: str, reader: str, server: Server, database: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(RECORD, reader)
@@ -141,7 +141,7 @@ def test_who_may_only_read_is_told_so_and_nothing_is_written(
     assert server.sql("SELECT count(*) FROM events WHERE text = 'a lorry'", database) == [(0,)]
 
 
-def test_a_pose_is_left_out_where_it_is_read(
+def test_a_pose_is_excluded_in_the_lab_too(
     run: str, reader: str, server: Server, database: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In the lab's record, not in that of the rig, which has a run of the same name."""

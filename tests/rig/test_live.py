@@ -72,7 +72,7 @@ def test_the_cause_is_found_in_less_rig_time_than_the_standard_sweep(
 
 
 @pytest.mark.sockets
-def test_what_fails_ends_it_and_what_was_measured_stays(rig: Rig, bench: Callable[..., str]) -> None:
+def test_a_failure_ends_the_loop_and_the_runs_stay(rig: Rig, bench: Callable[..., str]) -> None:
     ended = rig(
         "discover", "--live", "--unattended", "--bench",
         bench(TURNED, beta={"faults": [{"what": "silence", "at_s": 100}]}),
@@ -100,7 +100,7 @@ def done(*answers: Discovery[Fit]) -> list[Measurement]:
     return [Measurement(FIRST, "run", answer, 0.0) for answer in answers]
 
 
-def test_an_explanation_stands_when_later_data_leave_it_alone() -> None:
+def test_an_explanation_is_confirmed_if_later_data_give_it_as_the_only_one() -> None:
     one = found(causes=("hysteresis",))
     doubtful = changed(one, alternatives={"hysteresis": ("dead-zone",)})
     assert doubtful.verdict == "ambiguous"
@@ -113,7 +113,7 @@ def test_an_explanation_stands_when_later_data_leave_it_alone() -> None:
     assert not is_confirmed(done(one, changed(one, causes=("hysteresis", "bias-drift"))))
 
 
-def test_what_is_unexplained_stands_when_the_pattern_stays() -> None:
+def test_an_unexplained_verdict_is_confirmed_if_the_pattern_stays() -> None:
     steps = [found(spoilt=True, left=f"step at t = {t} s") for t in (900, 917)]
     assert [step.verdict for step in steps] == ["unexplained", "unexplained"]
     assert is_confirmed(done(*steps))
@@ -126,13 +126,13 @@ def loop(world: dict[str, Any], minutes: float) -> list[Measurement]:
     return list(Live(bench, None, read_model("linear"), catalogue(), 60 * minutes, rig.measure).measurements())
 
 
-def test_nothing_is_begun_that_there_is_no_time_for() -> None:
+def test_no_experiment_begins_that_is_longer_than_the_remaining_time() -> None:
     (only,) = loop({}, minutes=10)
     assert (only.following, only.used_s < 600) == (None, True)
 
 
 @pytest.mark.slow
-def test_what_no_poses_can_tell_is_proposed_and_the_time_is_used() -> None:
+def test_an_experiment_without_poses_is_proposed_and_the_time_is_used() -> None:
     told = loop({"base": {"tilt_y_deg": 0.1}}, minutes=20)
     last = told[-1].discovery
     assert last.verdict == "ambiguous"

@@ -33,7 +33,7 @@ def test_a_message_is_shown_as_text_where_it_is_some(data: bytes, text: str) -> 
 
 
 @pytest.mark.sockets
-def test_a_run_tells_what_it_did_what_stopped_it_and_that_it_went_on(rig: Rig) -> None:
+def test_a_run_shows_its_steps_its_interruption_and_its_continuation(rig: Rig) -> None:
     bench = read_bench()
     with Record() as record:
         broken = afflicted(bench, "alpha", Fault("alarm", at_s=30.0))

@@ -70,7 +70,7 @@ def test_the_simulated_technician_makes_the_whole_sweep(rig: Rig, file: Callable
 
 
 @pytest.mark.sockets
-def test_what_a_script_reads_off_the_dial_counts(rig: Rig, file: Callable[..., str]) -> None:
+def test_the_dial_reading_of_a_script_is_the_angle(rig: Rig, file: Callable[..., str]) -> None:
     answers = file({"mounting": True, "alpha-90": "yes", "beta-90": "90.083", "beta-180": 180}, "answers.yaml")
     ended = rig("run", "sweep", *SMALL, "--bench", file(manual()), "--answers", answers, "--unattended", "--json")
     with Record() as record:
@@ -90,7 +90,9 @@ def test_an_implausible_reading_ends_the_run(rig: Rig, file: Callable[..., str])
 
 
 @pytest.mark.sockets
-def test_where_nobody_turns_a_real_stage_the_run_stops_and_goes_on_later(rig: Rig, file: Callable[..., str]) -> None:
+def test_a_run_without_a_person_at_a_manual_stage_stops_and_is_resumed_later(
+    rig: Rig, file: Callable[..., str]
+) -> None:
     document = manual(url="person")
     document["limits"]["level_deg"] = None
     bench = file(document)
@@ -121,7 +123,7 @@ class Called(Onlooker):
 
 
 @pytest.mark.sockets
-def test_it_goes_on_sample_for_sample() -> None:
+def test_a_resumed_run_equals_an_undisturbed_one_sample_for_sample() -> None:
     sweep, bench = find("sweep"), Bench.model_validate(manual())
     settings = parse(sweep, {"inclinations_deg": "90", "step_deg": "90", "dwell_s": "0.2"})
     with Record() as record:
@@ -150,14 +152,14 @@ def test_its_plan_takes_as_long_as_the_technician() -> None:
     assert (rehearsed.poses, len(rehearsed.questions)) == (22, 5)  # mounting, and two axes of the level twice
 
 
-def test_a_wire_that_is_a_person_has_no_faults_of_a_wire(golden, file: Callable[..., str]) -> None:
+def test_a_stage_turned_by_a_person_has_no_faults(golden, file: Callable[..., str]) -> None:
     document = manual()
     document["instruments"]["beta"]["faults"] = [{"what": "silence"}]
     with golden.refused(BenchError):
         read_bench(Path(file(document)))
 
 
-def test_only_what_has_a_wire_is_served(rig: Rig, file: Callable[..., str]) -> None:
+def test_only_instruments_with_an_interface_are_served(rig: Rig, file: Callable[..., str]) -> None:
     document = manual()
     del document["instruments"]["adc"]
     ended = rig("simulate", "--bench", file(document))

@@ -29,7 +29,7 @@ def test_the_force_on_a_sensor_at_rest_is_that_of_the_simulated_rig(pose: Pose) 
 
 
 @given(pose=POSES)
-def test_the_force_in_a_turn_is_its_mean_over_the_turn(pose: Pose) -> None:
+def test_the_force_of_a_turn_is_the_mean_over_the_turn(pose: Pose) -> None:
     turn = Pose(**{**pose.__dict__, "rate_deg_s": 20.0})
     stops = [Pose(**{**pose.__dict__, "beta_deg": pose.beta_deg + k * 45.0}) for k in range(8)]
     mean = np.mean([specific_force_g(stop) for stop in stops], axis=0)

@@ -98,7 +98,7 @@ def test_the_plan_of_a_motion_takes_as_long_as_the_run(rig_home: Path) -> None:
         ({"duration_s": "0"}, SettingError, "motion: amplitude, frequencies and times must be above 0"),
     ],
 )
-def test_what_the_positioner_cannot_do_is_refused_by_the_plan(
+def test_the_plan_refuses_a_motion_beyond_the_positioner(
     settings: dict[str, str], error: type[Exception], said: str
 ) -> None:
     with pytest.raises(error, match=said):
@@ -142,7 +142,7 @@ def test_a_motion_run_holds_three_tables(rig_home: Path, few_swings: None, rever
 
 
 @pytest.mark.slow
-def test_a_probe_in_front_of_the_carriage_counts_the_other_way(rig_home: Path) -> None:
+def test_a_probe_in_front_of_the_carriage_has_the_opposite_sign(rig_home: Path) -> None:
     backward = read_bench().document()["d63"] | {"direction": -1}
     with Record() as record:
         run = shaken(record, bench(QUIET, d63=backward), **BRIEF).run

@@ -91,7 +91,7 @@ def test_a_page_and_its_report_plan_an_experiment_once_for_each_bench(monkeypatc
     assert benches == [read_bench(None).name, "another"]
 
 
-def test_what_is_not_computed_is_null() -> None:
+def test_values_that_are_not_computed_are_null() -> None:
     bench = read_bench(None)
     _, table = QuickRig(IDEAL.changed({"base": {"tilt_y_deg": 0.05}}), 8, bench).measure(COARSE)
     found = with_next_experiment(diagnose(table, read_model("linear")), catalogue(), bench, Path("b.yaml"))
@@ -108,14 +108,14 @@ def dispute(temperature: bool) -> Dispute:
     )
 
 
-def test_nobody_knows_the_rooms_temperature_ahead() -> None:
+def test_the_temperature_of_a_room_is_not_predicted() -> None:
     """Of what depends on temperature only experiments in the oven are foreseen, and they tell these two nothing."""
     told = Experiment("temperature-cycle", {}, (("a", "b"),), "by physics")
     assert choose_experiment(dispute(temperature=True), told, read_bench(None)).expected is None
     assert choose_experiment(dispute(temperature=False), told, read_bench(None)).expected is not None
 
 
-def test_an_experiment_that_needs_an_oven_is_not_planned_without_one_and_says_so(
+def test_an_experiment_that_needs_an_oven_is_proposed_with_a_remark_without_one(
     bench_file: Callable[..., Path],
 ) -> None:
     parts = {
@@ -135,7 +135,7 @@ def test_limits_of_a_stage_rule_experiments_out(bench_file: Callable[..., Path])
     assert "alpha: 150 deg is outside its limits" in choose_experiment(dispute(temperature=False), told, bench).why
 
 
-def test_the_oven_warms_over_minutes_and_time_goes_on() -> None:
+def test_the_sensor_in_an_oven_warms_over_minutes() -> None:
     bench = read_bench(None)
     _, table = QuickRig(IDEAL, 1, bench).measure(COARSE)
     _, planned = plan_experiment(

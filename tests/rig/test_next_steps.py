@@ -61,7 +61,7 @@ def test_uncertainties_of_the_noise_alone_are_called_so(procedure: str, said: bo
         ({}, ""),
     ],
 )
-def test_what_is_marginal_is_measured_longer(settings: dict[str, Any], hint: str) -> None:
+def test_a_marginal_result_proposes_a_longer_measurement(settings: dict[str, Any], hint: str) -> None:
     text = steps(replace(RUN, settings=settings), noise_rms_x=result("marginal"))
     assert (
         f"Marginal: noise-rms-x reaches across the limit with its uncertainty; 4 times the duration{hint} halves"
@@ -76,7 +76,7 @@ def test_the_next_command_is_named() -> None:
     assert "rig compare r1/a1," in steps(replace(RUN, bench={"sensors": {"a1": {}, "a2": {}}}))
 
 
-def test_poses_that_are_left_out_are_named_with_their_reasons() -> None:
+def test_excluded_poses_are_named_with_their_reasons() -> None:
     assert "Left out: pose 6 (repeated by hand); pose 9 (a lorry)" in steps(
         excluded={6: "repeated by hand", 9: "a lorry"}
     )

@@ -94,7 +94,7 @@ def test_other_deviations_and_the_spectrum_have_intervals(rig: Rig, folder: Path
         ("warm", "follows", "x follows temperature_c by +0.1", "rate-random-walk"),
     ],
 )
-def test_what_is_no_noise_is_said_beside_the_coefficients_that_it_spoils(
+def test_a_signal_that_is_no_noise_is_named_with_the_coefficients_that_it_spoils(
     rig: Rig, folder: Path, name: str, kind: str, says: str, spoils: str
 ) -> None:
     k = np.arange(6000)
@@ -239,12 +239,12 @@ def test_bad_input_of_the_noise_command_is_one_message(
     assert len(ended.err.strip().splitlines()) <= (4 if "Usage" in ended.err else 1)
 
 
-def test_short_gaps_are_closed_up_and_told(rig: Rig, folder: Path) -> None:
+def test_samples_are_joined_across_short_gaps_with_a_remark(rig: Rig, folder: Path) -> None:
     t_s = np.arange(6000) / 50
     t_s[2000:] += 1.0
     ended = rig("noise", table(folder / "gap.csv", t_s, vx_v=samples()), "--json")
     assert ended.done().document["rate_hz"] == pytest.approx(50)
-    assert "a gap is closed up, 1 s in all" in ended.err
+    assert "across a gap, 1 s in total" in ended.err
 
 
 def test_times_of_a_computer_that_samples_reach_in_bursts(rig: Rig, folder: Path) -> None:
@@ -256,7 +256,7 @@ def test_times_of_a_computer_that_samples_reach_in_bursts(rig: Rig, folder: Path
     assert "Times are uneven" in ended.err
 
 
-def test_deviations_are_given_at_the_wanted_times(rig: Rig, folder: Path) -> None:
+def test_deviations_are_given_at_the_requested_times(rig: Rig, folder: Path) -> None:
     said = rig("noise", "still.npy", "--rate", "50", "--tau", "0.1", "--tau", "3", "--json").done().document["allan"]
     assert said["tau_s"] == [0.1, 3.0]
     assert said["deviation"] == pytest.approx(deviations(samples(), (5, 150)).tolist())
@@ -267,7 +267,7 @@ def test_deviations_are_given_at_the_wanted_times(rig: Rig, folder: Path) -> Non
         assert again[name][0] == pytest.approx(octaves[name][3])
 
 
-def test_a_time_that_is_no_whole_number_of_samples_is_said_to_be_rounded(rig: Rig, folder: Path) -> None:
+def test_an_averaging_time_that_is_no_whole_number_of_samples_gets_a_remark(rig: Rig, folder: Path) -> None:
     ended = rig("noise", "still.npy", "--rate", "50", "--tau", "0.05", "--tau", "0.1")
     assert ended.status == 0
     assert "An averaging time of 0.05 s is not a whole number of samples: 0.04 s is used." in ended.err

@@ -100,7 +100,7 @@ def test_three_commands_name_the_same_disturbances(rig: Rig, tmp_path: Path, nam
 
 
 @pytest.mark.slow
-def test_of_the_default_rig_both_outputs_follow_the_supply_and_no_random_walk_is_named(
+def test_both_outputs_of_the_default_rig_follow_the_supply_without_a_random_walk(
     rig: Rig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("RIG_HOME", str(tmp_path))

@@ -174,7 +174,7 @@ def test_commands_and_report_print_the_same_verdict(answers: Answers, undrawn: N
     assert discovery["text"].partition(". ")[0].rstrip(".") in words
 
 
-def test_nothing_is_called_complete_above_a_likely_candidate(answers: Answers) -> None:
+def test_a_model_with_a_likely_candidate_is_not_called_complete(answers: Answers) -> None:
     _, seen = answers.session
     for result in seen:
         likely = [c for c in result.candidates if c.probability > LIKELY]

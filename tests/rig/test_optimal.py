@@ -73,13 +73,13 @@ def test_the_same_question_has_the_same_answer() -> None:
     assert chosen().equal.poses == chosen.__wrapped__().equal.poses
 
 
-def test_what_the_sweep_tells_is_told() -> None:
+def test_the_chosen_poses_determine_the_parameters_that_the_sweep_determines() -> None:
     found = chosen("physical")
     assert found.standard.determined.all()
     assert np.all(np.isfinite(found.equal.errors))
 
 
-def test_what_check_poses_tell_is_not_counted() -> None:
+def test_the_information_of_check_poses_is_not_counted() -> None:
     found = chosen()
     fitted = format_poses(pose for pose in found.equal.poses if pose.path != CHECK)
     judged = found.over.judged({**found.equal.plan.settings, "pose_list": fitted})
@@ -97,7 +97,7 @@ def test_the_sensor_is_turned_over_once() -> None:
     assert 0 < sum(flips) < len(flips)
 
 
-def test_travel_is_what_a_plan_counts() -> None:
+def test_the_travel_equals_that_of_a_plan() -> None:
     found = chosen().equal
     poses = found.poses
     between = moves_s(read_bench(), poses)
@@ -116,12 +116,12 @@ def test_too_many_and_too_few_are_refused(poses: int, told: str) -> None:
 
 
 @pytest.mark.parametrize("inclination", ["0", "90"])
-def test_a_sweep_that_tells_nothing_is_no_standard(golden, inclination: str) -> None:
+def test_a_sweep_without_information_is_no_standard(golden, inclination: str) -> None:
     with golden.refused(PlanError):
         chosen("physical", inclinations_deg=inclination)
 
 
-def test_people_are_told_what_it_saves_and_how_to_run_it() -> None:
+def test_the_text_states_the_saved_time_and_the_command() -> None:
     text = "\n".join(optimal_lines(chosen("physical"), None))
     assert "physical, 16 parameters: I-optimal poses" in text
     assert "times less rig time for the same worst standard error" in text
@@ -146,7 +146,7 @@ def test_the_printed_run_is_of_the_bench_that_was_planned_on() -> None:
     assert last == f"Run them:  rig run sweep --pose-list 'my poses.csv' {dwell} --bench worm.yaml"
 
 
-def test_what_no_sweep_tells_has_no_ratio() -> None:
+def test_a_parameter_that_no_sweep_determines_has_no_ratio() -> None:
     oven = read_model("linear").with_effect(catalogue()["temperature-bias"])  # a sweep keeps its temperature
     found = optimal(read_bench(), find("sweep"), settings(**COARSE), oven, 40, "I")
     assert optimal_document(found)["same_dwell"]["errors"]["temperature-bias slope x"] is None
@@ -211,7 +211,7 @@ class Leaving(Onlooker):
 
 
 @pytest.mark.sockets
-def test_an_interrupted_run_goes_on_with_the_same_poses() -> None:
+def test_an_interrupted_run_continues_with_the_same_poses() -> None:
     listing = {**chosen(poses=20).equal.plan.settings, "dwell_s": 0.1}
     with Record() as record:
         run = start(record, read_bench(), find("sweep"), listing, Leaving()).run

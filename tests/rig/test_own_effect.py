@@ -35,7 +35,7 @@ def data(here: Path) -> str:
 
 
 @pytest.mark.slow
-def test_what_is_left_becomes_an_effect_by_the_command_that_is_printed(rig: Rig, here: Path) -> None:
+def test_the_printed_command_adds_the_remaining_pattern_as_an_effect(rig: Rig, here: Path) -> None:
     """The stage's gear errs five times a turn, which no effect of the catalogue does."""
     columns = turns((90, 30, 150, 60), step_deg=15.0)
     x, y, _ = components(columns)
@@ -61,7 +61,7 @@ def test_what_is_left_becomes_an_effect_by_the_command_that_is_printed(rig: Rig,
     assert "5th-harmonic-stage-angle-beta" in page.read_text()
 
 
-def test_people_see_the_same_command(rig: Rig, data: str) -> None:
+def test_text_and_document_have_the_same_command(rig: Rig, data: str) -> None:
     for command in ("diagnose", "discover"):
         shown = rig(command, data, "--model", "linear").out
         line = next(line for line in shown.splitlines() if line.startswith("    rig add"))
@@ -94,7 +94,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("words", "says"), REFUSED)
-def test_what_cannot_be_added_is_refused_and_nothing_is_written(
+def test_an_effect_that_cannot_be_added_is_refused_and_nothing_is_written(
     rig: Rig, data: str, here: Path, words: list[str], says: str
 ) -> None:
     # y has nothing of a force that is x's own, so that an expression in ax is the linear model's on x alone

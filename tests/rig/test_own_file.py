@@ -68,7 +68,7 @@ def test_every_command_takes_a_spreadsheet_with_our_names(rig: Rig, arguments: t
 
 
 @pytest.mark.parametrize("command", ["fit", "compare", "diagnose", "discover"])
-def test_foreign_names_are_answered_with_the_import_that_takes_them(rig: Rig, folder: Path, command: str) -> None:
+def test_foreign_column_names_are_refused_with_the_import_command(rig: Rig, folder: Path, command: str) -> None:
     ended = rig(command, "theirs.csv")
     assert ended.status == 2
     line = "    rig import theirs.csv --kind poses --column alpha_deg=tilt --column beta_deg=table --column vx_v=Ux:mV"
@@ -76,7 +76,7 @@ def test_foreign_names_are_answered_with_the_import_that_takes_them(rig: Rig, fo
     assert sorted(path.name for path in folder.iterdir()) == ["ours.csv", "theirs.csv"]
 
 
-def test_raw_samples_become_poses_and_it_is_said(rig: Rig, folder: Path) -> None:
+def test_raw_samples_become_poses_with_a_remark(rig: Rig, folder: Path) -> None:
     write(folder / "raw.csv", "alpha_deg;beta_deg;vx_v", samples=60)
     said = "raw.csv is a log of raw samples: the table has the means of 100 poses, from 6240 samples."
     ended = rig("compare", "raw.csv", "--json")

@@ -141,7 +141,7 @@ def test_the_head_of_a_report_has_its_verdict() -> None:
     assert verdict_of("<h1>no report</h1>") is None
 
 
-def test_the_message_of_a_run_is_whole() -> None:
+def test_the_message_of_a_run_is_complete() -> None:
     text = 30 * "a reason, " + "and what to do"
     run = Run("r1", "poses", "sweep", "stopped", {}, {}, {}, "", {}, "", "", None, None, {}, 20)
     told = _circumstances(replace(run, message=text))[0]

@@ -113,7 +113,7 @@ def test_short_work_shows_no_progress(capsys: pytest.CaptureFixture[str]) -> Non
         (("import", "good.csv"), "storing good.csv: "),
     ],
 )
-def test_a_command_says_what_it_does(
+def test_a_command_shows_its_present_step(
     words: tuple[str, ...], says: str, rig: Rig, work: Path, undrawn: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     quiet = rig(*words)
@@ -135,6 +135,6 @@ for function in (lambda x: x + 1, lambda x: x + 2):
 """
 
 
-def test_a_command_that_compiles_says_so_once() -> None:
+def test_a_command_that_compiles_prints_one_line() -> None:
     ended = subprocess.run([sys.executable, "-c", COMPILED], capture_output=True, text=True, timeout=60, check=True)
     assert (ended.stdout, ended.stderr.splitlines()) == ("", [compiling.TEXT])

@@ -55,7 +55,7 @@ def test_a_run_arrives_to_the_last_bit_and_is_not_sent_again(own: Record, lab: R
     assert verify(lab).sound == tuple(sorted(runs))
 
 
-def test_only_what_is_complete_is_pushed(own: Record, lab: Record) -> None:
+def test_only_complete_runs_are_pushed(own: Record, lab: Record) -> None:
     stopped = a_run(own, state="stopped")
     assert unsent(own, lab) == []
     for call in (lambda: push(own, lab, stopped), lambda: unsent(own, lab, [stopped])):
@@ -71,7 +71,9 @@ def test_only_what_is_complete_is_pushed(own: Record, lab: Record) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("small_batches")
-def test_wherever_the_wire_is_cut_all_arrive_once(own: Record, lab: Record, server: Server, database: str) -> None:
+def test_all_runs_arrive_once_although_the_wire_is_cut_anywhere(
+    own: Record, lab: Record, server: Server, database: str
+) -> None:
     runs = [a_run(own, seed) for seed in range(3)]
     with wire(server.port, at_random(7, 120_000)) as cut:
         _, cuts = until_there(own, server.url(database, port=cut.port))
@@ -83,7 +85,9 @@ def test_wherever_the_wire_is_cut_all_arrive_once(own: Record, lab: Record, serv
 
 
 @pytest.mark.usefixtures("small_batches")
-def test_half_a_run_is_not_shown_and_is_gone_on_with(own: Record, lab: Record, server: Server, database: str) -> None:
+def test_a_partly_pushed_run_is_invisible_and_the_next_push_completes_it(
+    own: Record, lab: Record, server: Server, database: str
+) -> None:
     run = a_run(own)
     with wire(server.port, whole) as uncut:
         pushed(own, server.url(server.new_database("prepared"), port=uncut.port))
@@ -115,7 +119,7 @@ def at_commit(number: int) -> Callable[[], Judge]:
 
 @pytest.mark.usefixtures("small_batches")
 @pytest.mark.parametrize("number", [1, 3, COMMITS])
-def test_a_commit_that_nobody_heard_of_counts_once(
+def test_a_commit_whose_answer_is_lost_counts_once(
     own: Record, lab: Record, server: Server, database: str, number: int
 ) -> None:
     run = a_run(own)
@@ -147,7 +151,9 @@ def test_a_server_that_ends_the_connection_loses_nothing(
 
 
 @pytest.mark.usefixtures("small_batches")
-def test_two_who_push_the_same_at_once_bring_it_once(own: Record, server: Server, database: str, lab: Record) -> None:
+def test_two_simultaneous_pushes_of_a_run_store_it_once(
+    own: Record, server: Server, database: str, lab: Record
+) -> None:
     run = a_run(own)
     gate, done = threading.Barrier(2), []
 
@@ -167,7 +173,7 @@ def test_two_who_push_the_same_at_once_bring_it_once(own: Record, server: Server
     assert len(lab.lines(run)) == POSES
 
 
-def test_rigs_whose_runs_share_a_name_keep_them_apart(own: Record, lab: Record, tmp_path: Path) -> None:
+def test_runs_of_two_rigs_with_one_name_stay_separate(own: Record, lab: Record, tmp_path: Path) -> None:
     run = a_run(own)
     with Record(Path(shutil.copytree(own.folder, tmp_path / "other"))) as other:
         with other.engine.begin() as to:
@@ -205,7 +211,7 @@ def test_a_pose_that_is_excluded_later_is_excluded_by_the_next_push(own: Record,
     assert held(lab, run) == held(own, run)
 
 
-def test_what_was_changed_in_the_lab_is_not_overwritten(own: Record, lab: Record) -> None:
+def test_a_run_that_was_changed_in_the_lab_is_not_overwritten(own: Record, lab: Record) -> None:
     run = a_run(own)
     pushed(own, lab.where)
     lab.exclude(run, [3], "by the lab")
@@ -226,7 +232,7 @@ def test_a_byte_that_is_lost_in_the_lab_is_noticed(own: Record, lab: Record, ser
     assert set(verify(lab).changed) == {run, other}
 
 
-def test_a_lab_that_falls_silent_is_away(lab: Record, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_lab_that_stops_answering_counts_as_away(lab: Record, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(laboratory, "SILENCE_S", 0.1)
     said = re.escape("no connection to the lab's record (no answer for 0.1 s)")
     with pytest.raises(LabAway, match=said), lab.engine.connect() as at:
@@ -235,7 +241,9 @@ def test_a_lab_that_falls_silent_is_away(lab: Record, monkeypatch: pytest.Monkey
         assert at.exec_driver_sql("SHOW idle_in_transaction_session_timeout").scalar() == "1min"
 
 
-def test_a_locked_run_is_said_and_not_waited_for(own: Record, lab: Record, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_push_reports_a_locked_run_and_does_not_wait(
+    own: Record, lab: Record, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(laboratory, "LOCK_S", 0.1)
     run = a_run(own)
     with lab.engine.begin() as stopped:

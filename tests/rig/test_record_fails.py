@@ -49,7 +49,7 @@ def fill(record: Record) -> None:
     record.engine.raw_connection().execute(f"PRAGMA max_page_count = {pages}")
 
 
-def test_a_full_disk_stops_the_run_which_goes_on_when_there_is_room(tmp_path: Path) -> None:
+def test_a_full_disk_stops_the_run_and_it_continues_when_there_is_space(tmp_path: Path) -> None:
     with Record(tmp_path) as record, looking_on() as aftermath:
         outcome = swept(record, lambda: fill(record))
         assert isinstance(outcome.error, RecordError)
@@ -80,7 +80,7 @@ def test_a_run_whose_end_does_not_fit_on_the_disk_is_not_called_running(
     assert outcome.run.message == str(outcome.error)
 
 
-def test_a_record_that_goes_away_stops_the_run(tmp_path: Path) -> None:
+def test_a_record_that_disappears_stops_the_run(tmp_path: Path) -> None:
     home, away = tmp_path / "home", tmp_path / "away"
     with Record(home) as record, looking_on() as aftermath:
         outcome = swept(record, lambda: shutil.move(home, away))
@@ -100,7 +100,7 @@ def test_a_record_that_is_exchanged_is_not_written_into(golden, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("removed", [("-wal",), ("-wal", "-shm")])
-def test_a_removed_write_ahead_log_costs_no_pose_and_is_said(tmp_path: Path, removed: tuple[str, ...]) -> None:
+def test_a_removed_write_ahead_log_loses_no_pose_and_is_reported(tmp_path: Path, removed: tuple[str, ...]) -> None:
     def remove() -> None:
         for side in removed:
             (tmp_path / f"record.db{side}").unlink()
@@ -118,7 +118,7 @@ def test_a_removed_write_ahead_log_costs_no_pose_and_is_said(tmp_path: Path, rem
         assert [kept.number for kept in record.kept(outcome.run.run)] == list(range(POSES))
 
 
-def test_a_write_ahead_log_that_is_removed_after_the_last_pose_costs_none(tmp_path: Path) -> None:
+def test_a_write_ahead_log_removed_after_the_last_pose_loses_no_pose(tmp_path: Path) -> None:
     with Record(tmp_path) as record:
         run = swept(record, lambda: None).run.run
         (tmp_path / "record.db-wal").unlink()
@@ -191,7 +191,7 @@ def test_two_processes_write_one_record(rig_home: Path) -> None:
         assert a == b
 
 
-def test_what_is_no_fault_of_the_disk_is_not_called_one(tmp_path: Path) -> None:
+def test_an_error_of_the_program_is_not_called_a_fault_of_the_disk(tmp_path: Path) -> None:
     with Record(tmp_path) as record, pytest.raises(Exception, match="no such table") as failed:
         record.engine.connect().exec_driver_sql("SELECT * FROM nowhere")
     assert not isinstance(failed.value, RecordError)

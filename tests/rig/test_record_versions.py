@@ -41,7 +41,7 @@ def shape(path: Path) -> dict[str, set[tuple[str, str]]]:
         return {name: {(row[1], row[2]) for row in connection.execute(f"PRAGMA table_info({name})")} for name in tables}
 
 
-def test_there_is_a_way_from_every_version() -> None:
+def test_every_older_version_can_be_upgraded() -> None:
     assert sorted(NEW_COLUMNS) == list(range(1, SCHEMA))
     assert [version(file) for file in FILES] == list(range(1, SCHEMA))
 

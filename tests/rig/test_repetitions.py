@@ -61,7 +61,7 @@ def states(state: Any, key: str) -> list[Any]:
 
 
 @pytest.mark.sockets
-def test_what_stops_a_run_switches_the_oven_off() -> None:
+def test_the_stop_of_a_run_switches_the_oven_off() -> None:
     with connect_all(Bench.model_validate(bench({}))) as rig:
         oven: Any = rig.drivers["oven"]
         oven.set_temperature(60.0)
@@ -93,7 +93,7 @@ def test_repetitions_of_every_kind_are_in_the_budget(rig: Rig) -> None:
 
 @pytest.mark.sockets
 @pytest.mark.slow
-def test_what_the_technician_does_by_hand_is_in_the_budget(rig: Rig, tmp_path: Path) -> None:
+def test_manual_work_is_in_the_uncertainty_budget(rig: Rig, tmp_path: Path) -> None:
     document = by_hand()
     document["world"] = {"preset": "ideal", "noise": {"white_v": 1e-5}, "seating": {"tilt_deg": 0.02, "grip_pm": 20.0}}
     path = tmp_path / "bench.yaml"
@@ -122,7 +122,7 @@ def test_a_plan_says_who_switches_the_power() -> None:
 
 
 @pytest.mark.sockets
-def test_the_reference_pose_tells_drift(rig: Rig, tmp_path: Path) -> None:
+def test_the_reference_pose_shows_drift(rig: Rig, tmp_path: Path) -> None:
     document = bench({})
     document["world"] = {"preset": "ideal", "noise": {"white_v": 1e-5}, "supply": {"drift_v_per_h": 0.1}}
     path = tmp_path / "bench.yaml"

@@ -33,7 +33,7 @@ from tests.rig.conftest import Rig
         (1.001, None, 1.0, "fail"),
     ],
 )
-def test_the_uncertainty_has_its_say(value: float, std: float | None, limit: Any, verdict: str) -> None:
+def test_a_verdict_uses_the_uncertainty(value: float, std: float | None, limit: Any, verdict: str) -> None:
     assert Result(value, "V", std).verdict(limit) == verdict
 
 
@@ -44,7 +44,7 @@ def test_a_result_without_a_limit_has_no_verdict() -> None:
 
 
 @pytest.mark.parametrize("given", [3.0, {"value": 3.0}, {"value": "much", "unit": "g"}])
-def test_what_is_no_result_is_said_to_be_none(golden, given: Any) -> None:
+def test_an_invalid_result_is_refused(golden, given: Any) -> None:
     with golden.refused(ProcedureError):
         read_returned("mass", given)
 
@@ -129,7 +129,7 @@ def test_a_bench_without_a_level_has_it_read_and_typed(rig: Rig, tmp_path: Path)
 
 
 @pytest.mark.sockets
-def test_what_was_measured_is_complete_even_if_nothing_comes_of_it(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_whose_results_fail_is_complete(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     def cannot(*readings: object) -> None:
         raise DataError("the stretches are too short; measure longer")
 

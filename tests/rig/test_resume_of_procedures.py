@@ -24,7 +24,9 @@ UNATTENDED = ("--dwell-s", "0.2", "--unattended", "--json")
         ]
     ),
 )
-def test_it_goes_on_sample_for_sample(procedure: tuple[str, ...], at_pose: int, rig: Rig) -> None:
+def test_a_resumed_run_equals_an_undisturbed_one_sample_for_sample(
+    procedure: tuple[str, ...], at_pose: int, rig: Rig
+) -> None:
     whole = rig("run", *procedure, *UNATTENDED).document["run"]
     with sigterm_at(at_pose):
         assert rig("run", *procedure, *UNATTENDED).status == 4

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.bench import read_bench
-from rig.record import Event, Line, Record
+from rig.record import Event, LogLine, Record
 from rig.record.history import _turns, history
 from rig.record.measured import INTERRUPTIONS, table_of
 from rig.runs.runner import resume, start
@@ -22,8 +22,8 @@ class InATerminal(Onlooker):
     place = "in a terminal"
 
 
-def lines(*kinds: tuple[str, str]) -> list[Line]:
-    return [Line(f"2026-11-29T12:00:0{k}", 0.0, "run", what, text) for k, (what, text) in enumerate(kinds)]
+def lines(*kinds: tuple[str, str]) -> list[LogLine]:
+    return [LogLine(f"2026-11-29T12:00:0{k}", 0.0, "run", what, text) for k, (what, text) in enumerate(kinds)]
 
 
 def test_a_stopped_and_resumed_run_says_so_in_its_events_table_and_export(
@@ -79,7 +79,7 @@ def test_an_undisturbed_run_has_no_interruptions() -> None:
         assert INTERRUPTIONS not in table_of(record, run.run).constants
 
 
-def test_a_part_that_was_killed_is_named_where_the_run_goes_on() -> None:
+def test_a_resume_records_that_the_part_before_was_killed() -> None:
     killed = _turns(lines(("begun", "sweep at pose 0"), ("begun", "sweep at pose 3"), ("complete", "")))
     assert [(turn.what, turn.text) for turn in killed] == [
         ("begun", "sweep at pose 0"),

@@ -41,7 +41,7 @@ def test_a_process_that_was_killed_has_ended() -> None:
     assert "MemoryError" in (read(KEY) or status).error
 
 
-def test_only_the_last_ones_are_kept() -> None:
+def test_only_the_last_status_files_are_kept() -> None:
     file(KEY, "json").parent.mkdir(parents=True)
     for number in range(25):
         Status(f"{KEY}-{number:02}", 4711, "sweep", "a bench", phase="ended").write()
@@ -49,7 +49,7 @@ def test_only_the_last_ones_are_kept() -> None:
     assert [key[-2:] for key in keys()] == [f"{number:02}" for number in range(25 - KEPT_ESTIMATES, 25)]
 
 
-def test_of_those_that_are_kept_none_is_under_way() -> None:
+def test_the_status_of_a_run_in_progress_is_not_removed() -> None:
     folder().mkdir(parents=True)
     for number in range(25):
         Status(f"{KEY}-{number:02}", 4711, "sweep", "a bench", phase="running").write()
@@ -75,7 +75,7 @@ def test_a_process_that_ended_before_its_run_began_has_no_run_to_resume() -> Non
     assert stop_words(replace(ended, error="its process ended: a fault")) == ""
 
 
-def test_a_process_that_a_full_disk_has_silenced_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_stopped_by_a_full_disk_has_this_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     folder().mkdir(parents=True)
     Status(KEY, 0, "sweep", "the rig", "running", run="a run").write()
     ended = read(KEY)
@@ -110,7 +110,7 @@ def test_the_last_status_counts_the_poses_of_the_record() -> None:
     assert progress_words(last) == "8 of 10 poses"
 
 
-def test_a_run_that_reaches_its_target_early_is_whole() -> None:
+def test_a_run_that_reaches_its_target_early_is_complete() -> None:
     folder().mkdir(parents=True)
     writer = status_file.StatusWriter(KEY, "hand-turns", read_bench(HAND))
     with Record() as record:

@@ -142,7 +142,7 @@ LIMITS = [  # a fault of an instrument, the exit status, and what is said
 
 
 @pytest.mark.parametrize(("procedure", "role", "fault", "status", "said"), LIMITS)
-def test_a_passed_limit_stops_the_run_and_says_what_to_do(
+def test_a_run_beyond_a_limit_stops_with_a_remedy(
     procedure: str, role: str, fault: Fault, status: int, said: str, aftermath: Aftermath
 ) -> None:
     with Record() as record:
@@ -228,7 +228,7 @@ class Mover:
         self._told(f"run {on}")
 
 
-def test_all_are_told_to_stop_before_the_first_is_waited_for() -> None:
+def test_all_instruments_get_the_stop_command_before_the_first_wait() -> None:
     log: list[str] = []
     movers: dict[str, Any] = {"alpha": Mover("alpha", log, "halt"), "beta": Mover("beta", log, "stop")}
     clock = GuardedClock(SimulatedClock())
@@ -255,7 +255,7 @@ def test_a_run_switches_off_the_stop_inputs_that_an_earlier_one_left_on() -> Non
     assert told == [["alpha: the stop input was still on from an earlier stop; it is off now"], []]
 
 
-def test_faults_are_no_part_of_what_a_run_depends_on() -> None:
+def test_the_configuration_of_a_run_does_not_include_faults() -> None:
     bench = read_bench()
     broken = afflicted(bench, "alpha", Fault("alarm", at_s=3.0))
     assert broken.configuration("sweep", {}) == bench.configuration("sweep", {})

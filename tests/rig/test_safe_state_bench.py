@@ -40,7 +40,7 @@ def with_faults(role: str, *faults: dict[str, Any], **part: Any) -> dict[str, ob
         ("oven", {"what": "silence", "size": 3}, "faults.0.size: this fault has no size; remove it"),
     ],
 )
-def test_a_fault_that_cannot_be_is_refused(
+def test_an_impossible_fault_is_refused(
     bench_file: Callable[..., Path], role: str, fault: dict[str, Any], said: str
 ) -> None:
     path = bench_file(with_faults(role, fault))
@@ -57,7 +57,7 @@ def test_a_real_instrument_is_given_no_faults(golden, bench_file: Callable[..., 
 
 
 @pytest.mark.sockets
-def test_a_run_fails_is_repaired_and_goes_on(bench_file: Callable[..., Path], rig: Rig) -> None:
+def test_a_run_that_fails_continues_after_a_repair(bench_file: Callable[..., Path], rig: Rig) -> None:
     fault = {"what": "flipped-bit", "at_s": 40, "size": 20}
     broken = bench_file(with_faults("beta", fault))
     failed = rig("run", "sweep", *SMALL_ARGUMENTS, "--bench", str(broken), "--unattended", "--json")

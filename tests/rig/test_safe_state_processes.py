@@ -75,7 +75,7 @@ def test_a_lock_makes_its_folder(tmp_path: Path) -> None:
         assert is_held(tmp_path / "new" / "home", "r1")
 
 
-def test_who_is_refused_is_told_who_holds_it_and_a_kill_sets_it_free(tmp_path: Path) -> None:
+def test_a_refused_process_learns_the_owner_of_the_lock_and_a_kill_releases_it(tmp_path: Path) -> None:
     with process("-c", HOLDS, str(tmp_path)) as child:
         assert said(child) == "holding"
         holder = rf"another process \({child.pid}, since \d{{4}}-\d\d-\d\d \d\d:\d\d:\d\d, with run r1\) uses serial:"

@@ -55,7 +55,7 @@ OTHERS = sorted(SHORT.keys() - {"motion", "repeat", *FAST})
 
 @pytest.mark.parametrize("procedure", first_fast((*FAST, *OTHERS), len(FAST)))
 @pytest.mark.parametrize(("method", "share"), first_fast([("sleep", 0.4), ("wait_readable", 0.7)]))
-def test_a_signal_is_heard_wherever_a_run_waits(
+def test_a_signal_is_received_wherever_a_run_waits(
     procedure: str, method: str, share: float, signal_at: Callable[[str, int], list[int]]
 ) -> None:
     with Record() as record:
@@ -74,7 +74,7 @@ def test_a_signal_is_heard_wherever_a_run_waits(
         assert found == whole or procedure in STRETCHES
 
 
-def test_a_signal_is_heard_while_a_run_asks() -> None:
+def test_a_signal_is_received_while_a_run_asks() -> None:
     with Record() as record, looking_on() as aftermath:
         outcome = start(record, read_bench(), *small_sweep(), Asked())
         assert (outcome.run.state, outcome.run.rows, aftermath.stops) == ("stopped", 0, 1)

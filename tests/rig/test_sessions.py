@@ -39,7 +39,7 @@ def test_six_faces_and_three_turns_give_the_published_calibration(rig: Rig, tmp_
     assert "fails" in rig("compare", run, "--model", models[0], "--json").document
 
 
-def test_what_a_session_does_not_say_is_asked_for(rig: Rig) -> None:
+def test_missing_facts_of_a_log_are_requested(rig: Rig) -> None:
     file = str(DATA / "imucal_ferraris_gyro" / "annotated_session.csv.gz")
     refused = rig("import", file, *SESSION, *RATE)
     assert refused.status == 2
@@ -49,7 +49,7 @@ def test_what_a_session_does_not_say_is_asked_for(rig: Rig) -> None:
     assert "needs the column t_s, or the constant sample_rate_hz" in refused.err
 
 
-def test_a_section_is_a_turn_where_the_gyroscope_says_so(tmp_path: Path) -> None:
+def test_a_section_of_a_log_is_a_turn_if_the_gyroscope_shows_a_turn(tmp_path: Path) -> None:
     """A turn back, by times of its own, and an unsteady hand: its mean is the angle over its time."""
     random, lines = np.random.default_rng(1), ["t_s,path,gx,gy,gz"]
     t = 0.0

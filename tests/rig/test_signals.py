@@ -87,7 +87,7 @@ class Forgotten:
         signal.raise_signal(signal.SIGTERM)
 
 
-def test_one_that_comes_while_something_is_forgotten_is_not_lost() -> None:
+def test_a_signal_during_a_finaliser_is_not_lost() -> None:
     hook = sys.unraisablehook
 
     def forget_and_wait() -> None:
@@ -101,7 +101,7 @@ def test_one_that_comes_while_something_is_forgotten_is_not_lost() -> None:
     assert sys.unraisablehook is hook
 
 
-def test_what_else_cannot_be_handed_on_is_told_as_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_discarded_exceptions_go_to_the_earlier_hook(monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[object] = []
     monkeypatch.setattr(sys, "unraisablehook", lambda what: told.append(what.exc_value))
 
@@ -149,11 +149,11 @@ def signalled_in(module: str, name: str) -> list[str]:
         ("rig.fleet.cluster", "start_client"),
     ],
 )
-def test_what_an_exception_would_break_is_not_interrupted(module: str, name: str) -> None:
+def test_indivisible_code_is_not_interrupted(module: str, name: str) -> None:
     assert signalled_in(module, name) == ["whole"]
 
 
-def test_a_delayed_signal_is_repeated_until_it_is_heard() -> None:
+def test_a_delayed_signal_is_repeated_until_it_is_received() -> None:
     """A wait that begins between a signal of the timer and its handler would hear none otherwise."""
     repeated_s: list[float] = []
 

@@ -56,14 +56,14 @@ def test_drivers_find_the_instruments_at_the_printed_addresses(served: Any) -> N
 
 
 @pytest.mark.parametrize("number", ENDING)
-def test_a_signal_ends_it_in_good_order(served: Any, number: signal.Signals) -> None:
+def test_a_signal_ends_the_server_without_an_error(served: Any, number: signal.Signals) -> None:
     child, _ = served
     child.send_signal(number)
     assert child.wait(timeout=30) == 0
     assert child.stderr.read() == ""
 
 
-def test_the_signals_are_given_back(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_earlier_signal_handlers_are_restored(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     def ended_by_both(servers: object, until: Callable[[], bool], clock: object) -> None:
         assert not until()
         for each in ENDING:
@@ -77,7 +77,7 @@ def test_the_signals_are_given_back(rig: Rig, monkeypatch: pytest.MonkeyPatch) -
 
 
 @pytest.mark.slow
-def test_a_bench_of_which_a_part_is_real_runs_in_real_time(
+def test_a_bench_with_one_real_instrument_runs_in_real_time(
     served: Any, bench_file: Callable[..., Path], rig: Rig
 ) -> None:
     _, document = served

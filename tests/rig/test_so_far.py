@@ -73,19 +73,19 @@ def test_bias_and_scale_factor_come_with_the_poses(follower: Any) -> None:
         assert abs(value - true) < 4 * std
 
 
-def test_an_estimate_says_from_how_many_poses_it_is(follower: Any) -> None:
+def test_an_estimate_states_its_number_of_poses(follower: Any) -> None:
     """It stays true when the run has ended and its page still shows it."""
     told = follower("poses")
     *_, values = (told.values(each) for each in kept(swept((90.0, 60.0)), {"vx": askew}))
     assert {value.remark for value in values} == {"from 24 poses"}
 
 
-def test_at_one_inclination_the_bias_is_not_told_beside_the_load_along_z(follower: Any) -> None:
+def test_one_inclination_does_not_separate_the_bias_from_the_load_along_z(follower: Any) -> None:
     assert set(last(follower("poses"), kept(swept((60.0,)), {"vx": askew}))) == {"scale-x"}
     assert last(follower("poses"), kept(swept((90.0,)), {"vx": askew}))["bias-x"].startswith("2.50")
 
 
-def test_a_gyroscope_that_feels_gravity_has_a_bias_when_it_was_turned_over(follower: Any) -> None:
+def test_a_gyroscope_sensitive_to_gravity_has_a_bias_after_it_was_turned_over(follower: Any) -> None:
     def gz(pose: Pose) -> float:
         return float(
             2.5 + 6e-3 * -pose.rate_deg_s * sensor_from_table(pose)[2, 2] + specific_force_g(pose) @ [0, 0, 0.02]
@@ -116,7 +116,7 @@ def test_the_hard_iron_of_an_axis_is_shown_after_the_turn_in_which_it_is_level(f
         assert std < 2 * NOISE_V
 
 
-def test_a_run_that_goes_on_knows_what_came_before_and_tells_each_path_when_it_is_over(follower: Any) -> None:
+def test_a_resumed_run_uses_the_earlier_poses_and_reports_each_complete_path(follower: Any) -> None:
     poses = kept(swept((90.0, 60.0)), {"a1.vx": askew, "a2.vx": askew})
     whole, resumed = follower("poses"), follower("poses", poses[:14])
     said = [whole.report(each) for each in poses]

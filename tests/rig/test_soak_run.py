@@ -76,14 +76,14 @@ def test_a_night_reaches_its_steady_state_after_hours_and_is_told_on_one_page(
 
 
 @pytest.mark.slow
-def test_in_an_oven_it_is_steady_within_an_hour(rig: Rig, cold: str) -> None:
+def test_a_soak_in_an_oven_is_steady_within_an_hour(rig: Rig, cold: str) -> None:
     ended = rig("run", "soak", "--bench", cold, "--oven-c", "45", "--off-s", "36000", "--duration-s", "21600", *NIGHT)
     found = ended.document["results"]
     assert 0.05 < found["steady-state-time"]["value"] < 1.0
 
 
 @pytest.mark.slow
-def test_a_soak_that_goes_on_is_foreseen_as_one_that_was_not_interrupted(rig: Rig, rig_home: Path) -> None:
+def test_a_resumed_soak_has_the_same_forecast_as_an_undisturbed_one(rig: Rig, rig_home: Path) -> None:
     """The part that was being kept when the first half ended is all that a follower misses."""
     run = rig("run", *SHORT_RUN, "--block-s", "5", "--json").document["run"]
     with Record(rig_home) as record:
@@ -110,7 +110,9 @@ def test_a_soak_that_goes_on_is_foreseen_as_one_that_was_not_interrupted(rig: Ri
         ((1.0, 1.5, 2.0), 1e-5, "+- 10 uV (95 %); steady"),
     ],
 )
-def test_bounds_are_told_however_wide(steady_h: tuple[float, float, float], half_v: float, said: str) -> None:
+def test_the_forecast_shows_its_bounds_at_any_width(
+    steady_h: tuple[float, float, float], half_v: float, said: str
+) -> None:
     final = Bounds(2.5 - half_v, 2.5, 2.5 + half_v)
     steady_s = Bounds(*(3600.0 * h for h in steady_h))
     forecast = Forecast(7200.0, Bounds(2.49, 2.491, 2.492), final, steady_s, 1e-4, 9e-3, 1.0)
@@ -120,7 +122,7 @@ def test_bounds_are_told_however_wide(steady_h: tuple[float, float, float], half
 
 
 @pytest.mark.slow
-def test_until_steady_it_ends_early_and_says_when(rig: Rig, cold: str) -> None:
+def test_a_soak_until_steady_ends_early_and_states_the_time(rig: Rig, cold: str) -> None:
     ended = rig("run", "soak", "--until-steady", "--bench", cold, "--off-s", "36000", *NIGHT)
     document = ended.document
     assert (ended.status, document["state"]) == (0, "complete"), ended.err
@@ -199,7 +201,7 @@ def test_a_kill_in_a_hold_is_a_gap_in_the_results(rig_home: Path) -> None:
         assert 0 < gap.length_s == pytest.approx(record.run(run).results["gap"]["value"])
 
 
-def test_the_plan_of_a_night_is_quick_and_whole(rig: Rig) -> None:
+def test_the_plan_of_a_night_is_quick_and_complete(rig: Rig) -> None:
     document = rig("plan", "soak", "--until-steady", "--json").document
     assert document["settings"]["until_steady"] is True
     assert document["poses"] == len(list(schedule(43200.0, 900.0, 10.0)))

@@ -52,7 +52,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, samples: tuple[Array
     return tmp_path
 
 
-def test_what_is_missing_is_found_added_and_no_longer_missed(rig: Rig, folder: Path) -> None:
+def test_a_missing_effect_is_found_and_added(rig: Rig, folder: Path) -> None:
     said = rig("diagnose", "still.csv", "--json").done().document
     assert said["schema"] == "rig.diagnosis/1"
     assert (said["verdict"], said["candidates"][0]["effect"]) == ("effect-missing", "flicker-noise")
@@ -102,7 +102,7 @@ def test_an_array_is_analysed_with_a_stated_rate(rig: Rig, folder: Path) -> None
     assert "give --rate HZ" in rig("discover", "x.npy").err
 
 
-def test_one_channel_may_be_asked_for(rig: Rig, folder: Path) -> None:
+def test_one_channel_can_be_chosen(rig: Rig, folder: Path) -> None:
     assert rig("diagnose", "still.csv", "--channel", "vy", "--json").done().document["verdict"] == "adequate"
     only = rig("fit", "still.csv", "--channel", "vy", "--out", "y.yaml", "--json").done().document
     assert {p["axis"] for p in only["parameters"]} == {"y"}
@@ -208,13 +208,15 @@ def test_bad_still_records_give_one_message(rig: Rig, folder: Path, command: str
     assert set(folder.iterdir()) == before
 
 
-def test_a_small_gap_is_closed_and_that_is_said(rig: Rig, folder: Path, samples: tuple[Array, Array]) -> None:
+def test_samples_are_joined_across_a_small_gap_with_a_remark(
+    rig: Rig, folder: Path, samples: tuple[Array, Array]
+) -> None:
     t_s = np.arange(N) / RATE_HZ
     t_s[3000:] += 5
     write("gap.csv", t_s, vx_v=samples[0])
     ended = rig("diagnose", "gap.csv")
     assert ended.status == 0
-    assert "a gap is closed up, 5 s in all" in ended.err
+    assert "across a gap, 5 s in total" in ended.err
 
 
 @pytest.mark.slow
@@ -236,7 +238,7 @@ def test_known_noise_lets_a_quiet_model_be_adequate(rig: Rig, folder: Path) -> N
 
 
 @pytest.mark.slow
-def test_no_legend_names_a_thing_twice(rig: Rig, folder: Path) -> None:
+def test_a_legend_has_each_name_once(rig: Rig, folder: Path) -> None:
     """Of a model that misses nothing, of one whose record had something taken off, and of a single process."""
     random = np.random.default_rng(3)
     np.save("white.npy", white(random, N))

@@ -41,7 +41,7 @@ def block(values: object) -> Samples:
 
 @settings(max_examples=25)
 @given(st.lists(POSES, max_size=4))
-def test_poses_come_back_as_they_were_kept(tmp_path_factory: pytest.TempPathFactory, poses: list[Pose]) -> None:
+def test_poses_are_read_as_they_were_written(tmp_path_factory: pytest.TempPathFactory, poses: list[Pose]) -> None:
     with Record(tmp_path_factory.mktemp("record")) as record:
         run = begin(record)
         for number, pose in enumerate(poses):
@@ -53,7 +53,7 @@ def test_poses_come_back_as_they_were_kept(tmp_path_factory: pytest.TempPathFact
         assert record.run(run).rows == len(poses)
 
 
-def test_a_run_becomes_the_table_of_its_poses() -> None:
+def test_the_table_of_a_run_has_its_poses() -> None:
     with Record() as record:
         run = begin(record)
         samples = block([[2.0, 1.0], [4.0, 1.0], [6.0, 1.0]])
@@ -76,7 +76,7 @@ def test_a_run_becomes_the_table_of_its_poses() -> None:
     assert table.constants == {"sensor": "ADXL203", "sample_rate_hz": 1000.0}
 
 
-def test_how_the_sensor_is_mounted_is_a_column_once_it_was_changed() -> None:
+def test_a_changed_mounting_is_a_column_of_the_table() -> None:
     with Record() as record:
         run = begin(record)
         record.keep(run, 0, KeptPose(Pose(90, 0, mount_deg=90.0, flip=1), block([[2.0, 1.0]]), 3.5, 21.5), None)
@@ -85,7 +85,7 @@ def test_how_the_sensor_is_mounted_is_a_column_once_it_was_changed() -> None:
     assert "vx_std_v" not in table
 
 
-def test_an_imported_table_comes_back_to_the_last_bit() -> None:
+def test_an_imported_table_is_read_again_bit_for_bit() -> None:
     columns = {"ax": [0.1, 1 / 3], "ay": [1e-300, 2.0], "az": [-0.0, 3.0]}
     table = Table.from_columns("positions", columns, {"unit": "count", "g": 9.81}, "their.csv", {"path": ("a", "b")})
     with Record() as record:
@@ -162,7 +162,7 @@ def test_a_file_that_is_no_record_is_left_alone(tmp_path: Path) -> None:
         Record(tmp_path)
 
 
-def test_a_folder_that_cannot_be_made_is_said(golden, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_named(golden, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with golden.refused(RecordError):
         Record(tmp_path / "file" / "home")
@@ -206,7 +206,7 @@ def test_a_record_of_the_first_version_is_brought_up_to_date(tmp_path: Path) -> 
         assert connection.execute("PRAGMA user_version").fetchone() == (SCHEMA,)
 
 
-def test_what_dials_showed_comes_back_beside_the_pose() -> None:
+def test_dial_readings_are_read_again_with_the_pose() -> None:
     with Record() as record:
         run = begin(record)
         kept = KeptPose(Pose(90, 0), block([[2.0, 1.0]]), 3.5, 21.5, alpha_read_deg=90.083, beta_read_deg=-0.083)
@@ -224,7 +224,7 @@ def test_a_reading_is_replaced_by_one_of_its_name() -> None:
         assert record.state(run) == {"at": 0.2}
 
 
-def test_an_excluded_pose_stays_with_its_reason_and_is_left_out() -> None:
+def test_an_excluded_pose_stays_in_the_record_with_its_reason() -> None:
     with Record() as record:
         run = begin(record)
         for number in range(3):

@@ -120,7 +120,9 @@ def test_a_link_that_a_person_has_put_there_may_lead_out(bench_file: Callable[..
     assert read_bench(bench_file({"folders": {"effects": "mine"}})).folders.effects == elsewhere
 
 
-def test_a_model_file_loads_no_effect_from_beside_it(tmp_path: Path, rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_model_file_loads_no_effect_from_its_folder(
+    tmp_path: Path, rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "evil.py").write_text("open('ran', 'w')")
     (tmp_path / "theirs.yaml").write_text(PAGE + "- effect: evil\n")
     (tmp_path / "data.csv").write_text("alpha_deg,beta_deg,vx_v\n" + "".join(f"90,{10 * k},2.5\n" for k in range(36)))
@@ -130,7 +132,7 @@ def test_a_model_file_loads_no_effect_from_beside_it(tmp_path: Path, rig: Rig, m
     assert not (tmp_path / "ran").exists()
 
 
-def test_that_a_persons_own_program_is_run_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_users_procedure_gives_a_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     path = tmp_path / "mine.py"
     path.write_text('"""mine: nothing.\n"""\ndef mine(rig):\n    pass\n')
     with caplog.at_level(logging.WARNING):

@@ -19,7 +19,7 @@ def planned(name: str, **settings: str) -> Plan:
     return plan(read_bench(), procedure, parse(procedure, settings))
 
 
-def test_a_sweep_is_one_line_for_each_way_round() -> None:
+def test_a_sweep_is_one_line_for_each_direction() -> None:
     found = stretches(planned("sweep"))
     assert len(found) == 14
     assert found[0].words == "alpha 90, beta 0 to 360 deg: 37 poses"
@@ -90,7 +90,7 @@ def test_a_long_plan_is_summed_up_and_a_short_one_printed(rig: Rig) -> None:
     assert "beta from 0 to 180 deg\n" in rig("plan", "level-check").out
 
 
-def test_of_very_many_stretches_the_middle_is_left_out(rig: Rig) -> None:
+def test_a_long_plan_omits_its_middle_stretches(rig: Rig) -> None:
     shown = rig("plan", "soak").out
     assert "similar lines" in shown
     assert len(shown.splitlines()) < 30

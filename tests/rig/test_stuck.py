@@ -97,7 +97,7 @@ def test_a_slow_motion_is_constant_at_its_turning_points() -> None:
         outputs.require_alive(Pose(45.0, 90.0, path="motion"), dwell(np.round(400 * np.sin(0.4 * t_s)), number))
 
 
-def test_a_turn_says_nothing_about_the_noise_at_rest() -> None:
+def test_samples_of_a_turn_are_not_used_for_the_noise_at_rest() -> None:
     outputs = StuckOutputs("rates")
     for number in range(8):
         outputs.require_alive(Pose(0, 0, rate_deg_s=20.0), dwell(np.round(noise(5.0)(DWELL)), number, "gx"))
@@ -114,7 +114,7 @@ def test_a_turn_is_judged_by_the_noise_at_rest(golden) -> None:
         outputs.require_alive(Pose(0, 0, rate_deg_s=40.0), dwell(DWELL * [1400.0], 9, "gx"))
 
 
-def test_poses_of_a_single_sample_tell_no_noise() -> None:
+def test_poses_of_a_single_sample_do_not_show_the_noise() -> None:
     outputs = StuckOutputs()
     for number in range(300):
         outputs.require_alive(Pose(0.0, 0.1 * number), dwell([float(number)], number))

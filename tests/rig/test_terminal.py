@@ -99,7 +99,7 @@ def test_a_cancelled_run_leaves_nothing() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("wish", "excluded"), [("repeat", [REPEATED]), ("resume", [])])
-def test_ctrl_c_stops_and_a_person_has_it_go_on(wish: str, excluded: list[str]) -> None:
+def test_ctrl_c_stops_a_run_and_a_person_continues_it(wish: str, excluded: list[str]) -> None:
     with begun(*LONG) as terminal:
         terminal.expect(UNDER_WAY)
         press_ctrl_c(terminal)

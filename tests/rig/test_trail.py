@@ -57,7 +57,7 @@ def test_any_added_effect_is_removed_and_the_others_stay(turned: ModelSession) -
         assert {term.effect.name for term in left.end.model.terms} == {"bias", "scale-factor", *left.names}
 
 
-def test_where_no_column_tells_the_noise_the_error_falls_and_rises_again(tmp_path: Path) -> None:
+def test_the_error_falls_and_rises_again_if_no_column_states_the_noise(tmp_path: Path) -> None:
     write_csv(magnetometer(), path := tmp_path / "hemisphere.csv")
     begun = model_session(Request(str(path), "field"))
     grown = begun.with_step(begun.tried(begun.effects["hard-iron"]))
@@ -106,7 +106,7 @@ def test_a_report_takes_the_search_that_its_session_has_made(turned: ModelSessio
     assert "misses axis-misalignment" in page()
 
 
-def test_a_session_is_judged_before_its_search_and_not_after_it(turned: ModelSession) -> None:
+def test_a_session_has_a_verdict_without_a_search_only_before_its_search(turned: ModelSession) -> None:
     judgement = turned.judged()
     assert judgement is not None
     assert judgement.verdict == "incomplete"
@@ -142,14 +142,14 @@ def test_a_page_plans_the_next_experiment_beside_its_report(tmp_path: Path, undr
     assert escape(experiment.command) in section
 
 
-def test_a_report_without_anything_to_plan_says_so(turned: ModelSession, undrawn: None) -> None:
+def test_a_report_without_a_next_experiment_says_so(turned: ModelSession, undrawn: None) -> None:
     turned.diagnosed()
     _, page = make_report(turned.request, pytest.fail, pytest.fail, lambda: turned, plans_next=False)
     assert "No further experiment is needed" in page()
     assert next_of(turned, pytest.fail) is None
 
 
-def test_of_two_pages_that_search_the_second_waits_for_the_first(
+def test_the_second_of_two_pages_waits_for_the_search_of_the_first(
     turned: ModelSession, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     searches, begun, go, doing = list[ModelSession](), Event(), Event(), Event()

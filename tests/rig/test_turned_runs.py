@@ -78,7 +78,7 @@ def test_a_magnetometer_is_calibrated_by_the_ellipsoid_and_by_hand(rig: Rig, fol
 
 
 @pytest.mark.sockets
-def test_one_horizontal_turn_says_what_it_cannot_show(rig: Rig, folder: Path) -> None:
+def test_one_horizontal_turn_names_the_parameters_that_it_cannot_show(rig: Rig, folder: Path) -> None:
     arguments = (*FIELD, *ONE, "--over", "no")
     document = run(rig, folder, arguments)
     assert set(document["results"]) == {

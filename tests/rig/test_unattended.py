@@ -72,7 +72,7 @@ def test_a_level_that_must_be_read_by_a_person_stops_the_others(name: str, deser
     assert "level-front-x" in str(outcome.error)
 
 
-def test_it_goes_on_with_a_file_of_answers(deserted: list[str]) -> None:
+def test_a_file_of_answers_continues_the_run(deserted: list[str]) -> None:
     sweep, settings = small_sweep()
     with Record() as record:
         run = start(record, read_bench(), sweep, settings, Quiet({})).run.run

@@ -22,7 +22,7 @@ def test_every_uncertainty_of_the_bench_is_one_of_the_budget() -> None:
     assert silent == {"true angle of alpha", "true angle of beta"}  # those have error tables
 
 
-def test_what_is_not_given_is_no_constant() -> None:
+def test_uncertainties_that_are_not_given_are_no_constants() -> None:
     assert not any("std" in name for name in Bench(instruments={}).constants)
 
 

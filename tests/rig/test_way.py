@@ -84,7 +84,9 @@ def random_poses() -> list[Pose]:
 
 @pytest.mark.parametrize(("mounted", "tolerance"), [(IDEAL, 2e-4), (TURNED, 5e-3)])
 @pytest.mark.parametrize("poses", [random_poses(), list(grid((90.0, 30.0, 135.0), 10.0, "ang"))])
-def test_the_session_and_the_model_go_the_same_way(poses: list[Pose], mounted: Array, tolerance: float) -> None:
+def test_the_session_and_the_model_have_the_same_path_of_the_stages(
+    poses: list[Pose], mounted: Array, tolerance: float
+) -> None:
     columns: dict[str, Any] = {
         "alpha_deg": [pose.alpha_deg for pose in poses],
         "beta_deg": [pose.beta_deg for pose in poses],

@@ -231,7 +231,7 @@ def test_a_cancellation_waits_for_the_end_of_a_compilation_or_an_import(module: 
     assert left.is_set()
 
 
-def test_what_a_cancellation_becomes_in_compiled_code_is_no_fault() -> None:
+def test_the_error_of_a_cancelled_compiled_call_is_no_fault() -> None:
     begun = threading.Event()
 
     def endless() -> None:

@@ -38,6 +38,6 @@ def test_a_token_that_others_read_or_that_is_damaged_is_replaced(kept: Path, spo
     assert kept.stat().st_mode & 0o777 == 0o600
 
 
-def test_where_it_cannot_be_kept_there_still_is_one(kept: Path) -> None:
+def test_a_token_that_cannot_be_stored_is_valid_for_this_start(kept: Path) -> None:
     kept.parent.write_text("a file where the folder would be")
     assert len(kept_token()) == 32

@@ -75,7 +75,7 @@ def test_a_repeated_pose_stays_in_the_record_and_is_measured_again() -> None:
     assert ("pose 6 excluded", REPEATED) in events
 
 
-def test_with_nothing_kept_there_is_nothing_to_repeat() -> None:
+def test_repeat_without_a_recorded_pose_continues() -> None:
     watch = Onlooker(wishes=["repeat"])
     first = iter([interrupt])
     watch.doing = lambda text: next(first, lambda: None)()
@@ -94,7 +94,7 @@ def test_the_stages_stand_still_before_a_person_is_asked() -> None:
 
 
 @pytest.mark.parametrize("number", first_fast([signal.SIGTERM, signal.SIGHUP]))
-def test_nobody_is_asked_after_another_signal(number: signal.Signals) -> None:
+def test_a_signal_other_than_ctrl_c_ends_the_run_without_a_question(number: signal.Signals) -> None:
     watch = Disturbed(lambda: signal.raise_signal(number), "resume")
     with Record() as record:
         outcome = start(record, read_bench(), *small_sweep(), watch)
@@ -121,7 +121,9 @@ def test_a_signal_at_the_question_ends_the_run(number: signal.Signals) -> None:
         assert str(outcome.error).startswith("stopped by a person; `rig resume ")
 
 
-def test_an_instrument_that_does_not_come_back_is_told_and_asked_about_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_instrument_that_still_does_not_answer_is_reported_and_the_question_is_repeated(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def gone(*arguments: object) -> None:
         raise InstrumentFailed("beta does not answer")
 
@@ -146,7 +148,7 @@ def test_a_limit_that_is_still_passed_is_asked_about_until_the_end() -> None:
     assert "outside the limits" in str(outcome.error)
 
 
-def test_a_run_that_is_not_wanted_leaves_nothing() -> None:
+def test_a_declined_run_leaves_nothing() -> None:
     watch = Onlooker()
 
     def refuse(plan: Plan) -> None:

@@ -47,7 +47,7 @@ def test_a_good_file_has_no_remark(kind: str, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
-def test_no_wrong_input_passes_without_a_word(tmp_path: Path) -> None:
+def test_every_wrong_input_gets_a_message(tmp_path: Path) -> None:
     found = {(kind, name): each for kind, name, each in answers(tmp_path)}
     assert {case: each.kind for case, each in found.items()} == listed()
     for case, each in found.items():
@@ -64,7 +64,7 @@ def test_the_page_lists_every_input_and_none_is_silent() -> None:
 
 
 @pytest.mark.parametrize(("kind", "name"), SILENT_TODAY)
-def test_what_a_file_cannot_show_is_listed_as_such(kind: str, name: str, tmp_path: Path) -> None:
+def test_faults_that_a_file_cannot_show_are_listed(kind: str, name: str, tmp_path: Path) -> None:
     """If one of these is found one day, it moves to the battery."""
     wrong = UNSEEN[kind][name][0](GOOD[kind]())
     (tmp_path / "wrong.csv").write_text(wrong.text())

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from drivers.philtec_d63 import SIMULATED, Curve
+from drivers.philtec_d63 import SIMULATED, CalibrationCurve
 from drivers.world.displacement_sensor import FibreProbe, certificate, seen_v
 from drivers.world.kernel import record
 
@@ -26,7 +26,7 @@ def test_it_has_a_near_side_a_peak_and_a_far_side() -> None:
 
 
 def test_the_travel_of_the_carriage_is_on_the_near_side() -> None:
-    curve = Curve.from_file(SIMULATED)
+    curve = CalibrationCurve.from_file(SIMULATED)
     low, high = curve.near[0][0], curve.near[-1][0]
     assert low < PROBE.standoff_um < PROBE.standoff_um + 100 < high
 
@@ -40,5 +40,5 @@ def test_its_errors_are_those_of_a_calibration(side: str, low: float, high: floa
     """Small, and not zero: the curve is measured, not the law itself."""
     gaps = np.linspace(low, high, 2001)
     volts = [seen_v(PROBE, gap) for gap in gaps]
-    errors = Curve.from_file(SIMULATED).displacement_um(volts, side) - gaps
+    errors = CalibrationCurve.from_file(SIMULATED).displacement_um(volts, side) - gaps
     assert 1e-4 < np.abs(errors).max() < error_um

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from drivers.philtec_d63 import SIMULATED, Curve
+from drivers.philtec_d63 import SIMULATED, CalibrationCurve
 from drivers.world.config import WorldConfig
 from drivers.world.errors import UnknownInput
 from drivers.world.positioner import Command, hold_command
@@ -90,7 +90,7 @@ def test_which_axis_feels_it_hangs_on_the_mount(axis: str, mount_deg: float, see
 
 def test_the_displacement_sensor_sees_the_carriage() -> None:
     volts = shaken(World(QUIET, seed=1))[:, 2]
-    gap_um = Curve.from_file(SIMULATED).displacement_um(volts)
+    gap_um = CalibrationCurve.from_file(SIMULATED).displacement_um(volts)
     found = component(gap_um, HZ, 1000.0, 1.0 + 2 * QUIET.converter.skew_s)  # third channel of the scan
     expected = -SWING_UM * followed(HZ, QUIET)
     assert gap_um.mean() == pytest.approx(QUIET.d63.standoff_um + 50.0, abs=0.02)

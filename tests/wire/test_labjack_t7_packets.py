@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.errors import StreamError
-from drivers.labjack_t7.stream import Calibration, Packets, packet_type
+from drivers.labjack_t7.stream import Packets, RangeCalibration, packet_type
 from drivers.labjack_t7.twin import codes_of_volts
 
 FIRST = bytes.fromhex("FF FF 00 00 00 0E 01 4C 10 00 00 00 00 00 00 00 00 01 80 00")
 SECOND = bytes.fromhex("00 00 00 00 00 0E 01 4C 10 00 00 00 00 00 00 00 FF FF 00 02")
-NOMINAL = Calibration(0.00031580578, -0.0003158058, 33523, -10.58695652)
+NOMINAL = RangeCalibration(0.00031580578, -0.0003158058, 33523, -10.58695652)
 
 
 def packet(number: int, samples: list[int], status: int = 0, additional: int = 0) -> bytes:
@@ -98,7 +98,7 @@ def test_volts_of_known_codes() -> None:
 @settings(derandomize=True, deadline=None)
 @given(st.integers(0, 65535), st.floats(0.99, 1.01), st.floats(0.99, 1.01))
 def test_the_twins_converter_undoes_the_calibration(code: int, up: float, down: float) -> None:
-    constants = Calibration(NOMINAL.positive_slope * up, NOMINAL.negative_slope * down, 33500.25, 0.0)
+    constants = RangeCalibration(NOMINAL.positive_slope * up, NOMINAL.negative_slope * down, 33500.25, 0.0)
     volts = constants.table()[code]
     assert codes_of_volts(np.array([[volts]]), [constants])[0, 0] == code
 
@@ -107,10 +107,10 @@ def test_the_twins_converter_undoes_the_calibration(code: int, up: float, down: 
 def test_each_range_has_its_own_four_constants(range_v: float) -> None:
     first = [10.0, 1.0, 0.1, 0.01].index(range_v) * 4
     words = struct.unpack(">82H", struct.pack(">41f", *range(41)))
-    assert Calibration.from_flash(words, range_v) == Calibration(first, first + 1, first + 2, first + 3)
+    assert RangeCalibration.from_flash(words, range_v) == RangeCalibration(first, first + 1, first + 2, first + 3)
 
 
 @pytest.mark.parametrize("constants", [(0.0, 0.0, 0.0, 0.0), (3e-4, 3e-4, 33523, -10), (3e-4, -3e-4, 65535, -10)])
 def test_an_erased_calibration_is_not_plausible(constants: tuple[float, ...]) -> None:
     assert NOMINAL.plausible
-    assert not Calibration(*constants).plausible
+    assert not RangeCalibration(*constants).plausible

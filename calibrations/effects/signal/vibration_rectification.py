@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy  # its rooms are loaded where they are first entered: a list of effects needs none
+import scipy  # its modules load slowly: they are imported at their first use, and a list of effects needs none
 
 from calibrations.effects import Constant, Effect, Parameter, Values
 from calibrations.effects.logged import LEVEL_DOC, follows_level, level

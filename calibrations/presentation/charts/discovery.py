@@ -45,7 +45,7 @@ MOST_CURVES = 4
 
 
 @dataclass(frozen=True)
-class Level:
+class ErrorLevel:
     """The error of a model in multiples of the noise floor (for noise: of chance), on rows of the fit and on others.
 
     `rms` is the same error in its unit, such as "3.8 mg".
@@ -67,15 +67,15 @@ class Measure:
     unseen: str = "rows not used in the fit"
 
 
-def levels(steps: Falling) -> list[Level]:
+def levels(steps: Falling) -> list[ErrorLevel]:
     """The model as it was, then each effect added."""
     return model_levels(steps.start, steps.steps, error_text)
 
 
-def model_levels(start: F, steps: Sequence[Step[F]], text: Callable[[F], str]) -> list[Level]:
+def model_levels(start: F, steps: Sequence[Step[F]], text: Callable[[F], str]) -> list[ErrorLevel]:
     """The model as it was, then each effect added; `text` writes the error of a fit with its unit."""
-    first = Level(brief(start.model.name), start.pooled_excess, start.held_out_excess, text(start))
-    return [first, *(Level(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, text(s.after)) for s in steps)]
+    first = ErrorLevel(brief(start.model.name), start.pooled_excess, start.held_out_excess, text(start))
+    return [first, *(ErrorLevel(f"+ {s.name}", s.after.pooled_excess, s.held_out_after, text(s.after)) for s in steps)]
 
 
 def brief(model: str) -> str:
@@ -89,7 +89,7 @@ def error_text(fit: Fit) -> str:
     return milli_amount(pool_in_milli(fit)[0], milli_unit(fit), 2)
 
 
-def waterfall(steps: Sequence[Level], words: Measure = Measure()) -> Chart:
+def waterfall(steps: Sequence[ErrorLevel], words: Measure = Measure()) -> Chart:
     """Error by model: a bar for the model as it was, one more for each effect added; the band is the noise floor.
 
     Bars are errors on rows of the fit, diamonds on rows that the fit did not use.

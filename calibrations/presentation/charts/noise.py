@@ -12,7 +12,7 @@ from calibrations.discovery.findings import Step
 from calibrations.discovery.results import Discovery
 from calibrations.noise.analysis import ChannelNoise, NoiseAnalysis
 from calibrations.noise.comparison import DeviationComparison, deviation, mismatch, variance_parts
-from calibrations.noise.deviations import Curve
+from calibrations.noise.deviations import DeviationCurve
 from calibrations.noise.fit import NoiseFit
 from calibrations.noise.likelihood import ChannelFit
 from calibrations.noise.record import Channel, Still
@@ -110,14 +110,17 @@ def units(still: Still) -> dict[bool, str]:
 
 
 def allan(
-    curve: Curve | DeviationComparison, scaled: Scaling, models: Sequence[ModelCurve], raw: Curve | None = None
+    curve: DeviationCurve | DeviationComparison,
+    scaled: Scaling,
+    models: Sequence[ModelCurve],
+    raw: DeviationCurve | None = None,
 ) -> Panel:
     """Dots are measured, bars intervals of 95 %; lines are the models, thin lines the parts of the first.
 
     `raw` is the curve of the record before non-noise signals were removed.
     """
     factor = scaled.factor
-    values = curve.deviation if isinstance(curve, Curve) else curve.measured
+    values = curve.deviation if isinstance(curve, DeviationCurve) else curve.measured
     series: list[Line | Points] = []
     if raw is not None:
         series.append(Points(raw.tau_s, factor * raw.deviation, "measured", QUIET, "circle-open", 5))
@@ -138,7 +141,7 @@ def allan(
 
 
 def ratio(curve: DeviationComparison) -> Panel:
-    """Measured over modelled deviation: where the interval leaves 1, the model fails."""
+    """Measured over modelled deviation: the model fails where the interval does not contain 1."""
     hover = [f"{abs(d):.1f} standard deviations off at {t:.4g} s"
              for d, t in zip(curve.deviations, curve.tau_s, strict=True)]  # fmt: skip
     low, high = curve.low / curve.modelled, curve.high / curve.modelled
@@ -326,7 +329,7 @@ def _deviations(noise: ChannelNoise, model: ModelCurve, scaled: Scaling) -> Char
     return side_by_side([left_panel, right_panel], 4.0, share_y=True)
 
 
-def _other_deviation(curve: Curve, scaled: Scaling, name: str, colour: str) -> tuple[Band, Line]:
+def _other_deviation(curve: DeviationCurve, scaled: Scaling, name: str, colour: str) -> tuple[Band, Line]:
     factor = scaled.factor
     band = Band(curve.tau_s, factor * curve.low, factor * curve.high, colour=colour, opacity=0.18)
     return band, Line(curve.tau_s, factor * curve.deviation, name, colour, markers=True)

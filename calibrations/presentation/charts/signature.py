@@ -21,7 +21,7 @@ from calibrations.model.chain import Step, force, forward, respond, sensed
 from calibrations.noise.comparison import deviation
 from calibrations.noise.likelihood import ChannelFit, effect_lines
 from calibrations.noise.likelihood import Values as NoiseValues
-from calibrations.noise.lines import Line as Sinusoid
+from calibrations.noise.lines import SpectralLine
 from calibrations.noise.record import Channel
 from calibrations.presentation.chart import BLUE, GREEN, INK, QUIET, VERMILION, Axis, Chart, Dash, Line, Panel, Rule
 from calibrations.presentation.charts.noise import root
@@ -99,7 +99,7 @@ def _panel(effect: Effect, table: Table, a: Array, k: int, residual: Array) -> P
     if table.type.moving:
         close = (table.time_s >= CLOSE_S[0]) & (table.time_s <= CLOSE_S[1])
         rows = np.flatnonzero(close) if "output" in effect.places else np.arange(0, table.n, 8)
-        return Part(axis, residual, table.time_s, "time (s)", (Curve("", BLUE, "-", rows),))
+        return Part(axis, residual, table.time_s, "time (s)", (JoinedRows("", BLUE, "-", rows),))
     if drivers := [name for name in effect.needs if name in LABELS]:
         abscissa = table.column(drivers[0]) / (60.0 if drivers[0] == "t_s" else 1.0)
         return Part(axis, residual, abscissa, LABELS[drivers[0]], tuple(_inclination_curves(table, ("-", "-"))))
@@ -108,7 +108,9 @@ def _panel(effect: Effect, table: Table, a: Array, k: int, residual: Array) -> P
         if np.max(np.abs(residual - residual[rows][group])) < EQUAL_VALUES * np.ptp(residual) and _smooth(
             residual[rows]
         ):
-            return Part(axis, residual, component, f"specific force along {name} (g)", (Curve("", BLUE, "-", rows),))
+            return Part(
+                axis, residual, component, f"specific force along {name} (g)", (JoinedRows("", BLUE, "-", rows),)
+            )
     styles = ("-", "--") if "direction" in effect.needs else ("-",)
     return Part(axis, residual, table.column("beta_deg"), "β (deg)", tuple(_inclination_curves(table, styles)))
 
@@ -119,14 +121,14 @@ def _smooth(values: Array) -> bool:
     return float(steps @ steps) < SMOOTH * float(deviations @ deviations)
 
 
-def _inclination_curves(table: Table, styles: tuple[str, ...]) -> Iterator[Curve]:
+def _inclination_curves(table: Table, styles: tuple[str, ...]) -> Iterator[JoinedRows]:
     """The rows of each inclination, one line for each direction that has a style."""
     alpha, direction = table.column("alpha_deg"), table.column("direction")
     for inclination in sorted(INCLINATIONS_DEG):
         colour = INCLINATIONS[int((inclination - 30.0) / 30.0)]
         for side, style in zip((1.0, -1.0), styles, strict=False):
             rows = np.flatnonzero((alpha == inclination) & (direction == side))
-            yield Curve(f"α = {inclination:g}°", colour, style, rows)
+            yield JoinedRows(f"α = {inclination:g}°", colour, style, rows)
 
 
 def sweep() -> Table:
@@ -185,7 +187,7 @@ SHOWN: Mapping[str, Mapping[str, float]] = {
 
 
 @dataclass(frozen=True)
-class Curve:
+class JoinedRows:
     """Rows that one line joins."""
 
     label: str
@@ -202,7 +204,7 @@ class Part:
     residual: Array
     abscissa: Array
     label: str
-    curves: tuple[Curve, ...]
+    curves: tuple[JoinedRows, ...]
     unit: str = "mV"
 
 
@@ -255,10 +257,10 @@ def rate_parts(effect: Effect) -> list[Part]:
     ]
 
 
-def _curves(n: int) -> Iterator[Curve]:
+def _curves(n: int) -> Iterator[JoinedRows]:
     """The curves, one for each edge that the sensor turns about."""
     for k, (axis, colour) in enumerate(zip(AXES, COLOURS, strict=True)):
-        yield Curve(f"about {axis}", colour, "-", np.arange(k * n, (k + 1) * n))
+        yield JoinedRows(f"about {axis}", colour, "-", np.arange(k * n, (k + 1) * n))
 
 
 def _simulate_turns_in_field() -> Table:
@@ -329,7 +331,7 @@ def _with_white(effect: Effect | None) -> ChannelFit:
     channel = Channel("x", "V", RATE_HZ, np.inf, SAMPLES, np.zeros(SAMPLES), 1, Welch(RATE_HZ).segments())
     white = catalogue()["white-noise"]
     effects, values = [white], {white.name: dict(WHITE)}
-    lines: tuple[Sinusoid, ...] = ()
+    lines: tuple[SpectralLine, ...] = ()
     if effect is not None:
         spectrum = shown_noise(effect)
         effects += [effect] if "spectrum" in effect.places and effect is not white else []

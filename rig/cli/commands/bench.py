@@ -44,7 +44,7 @@ NOT_MET, FAILED = 1, 3
 def check_command(bench_file: Path | None, example: bool, example_hand: bool, reset: bool, as_json: bool) -> int:
     """Connect to every instrument of the bench, identify it and run its self-test.
 
-    --reset asks before it resets an alarm: first remove its cause. Nothing moves by a reset.
+    --reset asks before it resets an alarm: first remove its cause. A reset moves nothing.
 
     Exit status 1: an instrument's certificate has expired. 3: an instrument does not answer, or fails its self-test.
     """

@@ -159,7 +159,7 @@ def export_model_command(
     """
     from calibrations.exporting.autopilots import Slot
     from calibrations.exporting.formats import NOISES, export_model
-    from calibrations.exporting.noise_files import Stream
+    from calibrations.exporting.noise_files import ExportSettings
     from calibrations.model.file import read_model
     from rig.services.compensation import export_document, export_lines
 
@@ -176,7 +176,7 @@ def export_model_command(
         form,
         comment,
         Slot(slot - 1, device_id),
-        Stream(topic, rate_hz or 0.0, walks),
+        ExportSettings(topic, rate_hz or 0.0, walks),
         reach,
         dict(map(input_range, ranges)),
     )

@@ -1,4 +1,4 @@
-"""demo: find three hidden faults of a simulated sensor, and compare them with what was hidden."""
+"""demo: find three hidden faults of a simulated sensor, and compare them with the true ones."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ MEASURING_SHARE = 0.4  # share of the bar
 @click.option("--realistic", is_flag=True, help="The default rig with all its faults at once; takes minutes.")
 @json_option
 def demo_command(folder: Path | None, realistic: bool, as_json: bool) -> None:
-    """Measure a simulated sensor with three hidden faults, find them, and compare them with what was hidden.
+    """Measure a simulated sensor with three hidden faults, find them, and compare them with the true ones.
 
-    --realistic is the second act: the default simulated rig, a standard sweep of 518 poses, and all faults at once.
+    --realistic uses the default simulated rig: a standard sweep of 518 poses, and all faults at once.
     """
     from calibrations.documents import discovery_document
     from calibrations.loop import compare, discover
@@ -76,7 +76,10 @@ def demo_command(folder: Path | None, realistic: bool, as_json: bool) -> None:
     click.echo(f"{discovery(discovered)}\n\nHidden faults and named causes (rms change of the output):\n")
     click.echo(faults.text())
     click.echo(f"\nReport: {page}   open it with: xdg-open {page}\nModel:  {model}\nRun:    {run}")
-    click.echo("The same in a browser: rig web" + ("" if realistic else "\nThe second act: rig demo --realistic"))
+    click.echo(
+        "The same in a browser: rig web"
+        + ("" if realistic else "\nWith all faults of the default rig at once: rig demo --realistic")
+    )
 
 
 def _measure(bench: Bench, settings: Mapping[str, str], progress: Progress) -> str:

@@ -1,4 +1,4 @@
-"""doctor and completion: look after the installation."""
+"""doctor and completion: check the installation, and complete words in a shell."""
 
 from __future__ import annotations
 

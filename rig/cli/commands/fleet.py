@@ -17,7 +17,14 @@ from calibrations.text import columns, concise, concise_in_prefix, count_words, 
 from rig.cli.terminal.complete import complete_model
 from rig.cli.terminal.output import FOLDER, bench_option, emit, json_option, note, out_option, require_outputs
 from rig.files import write_whole
-from rig.fleet.calibrate import CalibratedBatch, Calibration, calibrate_fleet, read_guide, write_guide, write_models
+from rig.fleet.calibrate import (
+    CalibratedBatch,
+    FleetCalibration,
+    calibrate_fleet,
+    read_guide,
+    write_guide,
+    write_models,
+)
 from rig.fleet.cluster import connect_workers
 from rig.fleet.discover import discover_fleet
 from rig.fleet.members import fleet_of
@@ -219,7 +226,7 @@ def reason_of(sensor: SensorVerdict) -> str:
     return "; ".join(filter(None, (", ".join(effect_texts), sensor.remark))) or "-"
 
 
-def calibration(result: Calibration) -> Iterator[str]:
+def calibration(result: FleetCalibration) -> Iterator[str]:
     """The result of `rig fleet calibrate`."""
     for batch in result.batches:
         yield from (*_batch(batch), "")

@@ -1,4 +1,4 @@
-"""history and control: a sensor over its life, and the rig over its check standards."""
+"""history and control: the calibrations of a sensor, and the control charts of a rig."""
 
 from __future__ import annotations
 

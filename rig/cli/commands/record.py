@@ -16,7 +16,7 @@ from rig.cli.terminal.complete import complete_data, complete_run
 from rig.cli.terminal.output import emit, json_option, note, out_option
 from rig.cli.terminal.progress import working
 from rig.errors import RecordError
-from rig.record import Event, KeptPose, Line, Record, Run
+from rig.record import Event, KeptPose, LogLine, Record, Run
 from rig.record.codec import digest_of
 from rig.record.history import history
 from rig.record.measured import MeasuredRun
@@ -144,7 +144,7 @@ def _event(event: Event, message: str | None) -> str:
     return f"  {event.at[:19].replace('T', ' ')}  {event.what}{text}"
 
 
-def _iterate_log(lines: Sequence[Line]) -> Iterator[str]:
+def _iterate_log(lines: Sequence[LogLine]) -> Iterator[str]:
     """Each line with its time of day (UTC) and the clock of the rig."""
     for line in lines:
         yield f"  {line.at[11:23]}  {line.clock_s:10.3f} s  {line.who}  {line.what}: {line.text}"

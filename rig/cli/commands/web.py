@@ -29,7 +29,7 @@ LOCAL_HOSTS = ("127.0.0.1", "localhost", "::1")
     help="Address to listen at. Another address opens the workbench to other machines.",
 )
 @click.option("--no-open", is_flag=True, help="Print the address and open no browser.")
-@click.option("--new-token", is_flag=True, help="Replace the kept token: older addresses and open pages end.")
+@click.option("--new-token", is_flag=True, help="Make a new token: older addresses and open pages stop working.")
 @click.option(
     "--bench",
     "bench_files",
@@ -43,9 +43,9 @@ def web_command(
 ) -> None:
     """Serve the workbench until Ctrl-C; print its address, and open it in the browser.
 
-    The address contains a token; the server answers no request without it. The token is kept for this user, so the
-    address lasts. Only this machine can connect, unless --host gives another address: then anyone who can read the
-    network traffic can read the token. A run continues after the server ends.
+    The address contains a token; the server answers no request without it. The token is stored for this user, so the
+    address stays valid. Only this machine can connect, unless --host gives another address: then anyone who can read
+    the network traffic can read the token. A run continues after the server ends.
     """
     from rig.bench import read_bench
     from rig.bench.file import DEMO
@@ -70,7 +70,7 @@ def web_command(
         if place.taken:
             note(
                 f"Another program, perhaps another workbench, uses port {join_words(map(str, place.taken))}. The next "
-                f"start takes port {place.port} again, so this address lasts. --port chooses a port."
+                f"start takes port {place.port} again, so this address stays valid. --port chooses a port."
             )
         if not no_open and not as_json:
             webbrowser.open(place.url)

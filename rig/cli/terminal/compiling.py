@@ -45,7 +45,7 @@ class _Watch(MetaPathFinder):
 def _listen(events: Any) -> None:
     """Print the line at the first event of a compilation."""
 
-    class Line(events.Listener):  # type: ignore[misc] # the base class is known when the compiler is loaded
+    class Announcement(events.Listener):  # type: ignore[misc] # the base class is known when the compiler is loaded
         said = False
 
         def on_start(self, _event: Any) -> None:
@@ -56,4 +56,4 @@ def _listen(events: Any) -> None:
         def on_end(self, _event: Any) -> None:
             pass
 
-    events.register("numba:compile", Line())
+    events.register("numba:compile", Announcement())

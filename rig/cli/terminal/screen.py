@@ -100,7 +100,7 @@ def screen_before_run(plan: Plan, procedure: Procedure, bench: Bench, free_bytes
     for name, text in _facts(plan, procedure, bench, free_bytes):
         facts.add_row(Text(name, style="bold"), text)
     for text in find_expired(bench, today):
-        facts.add_row(Text("Expired", style="bold yellow"), f"{text}: the run will carry a remark")
+        facts.add_row(Text("Expired", style="bold yellow"), f"{text}: the run gets a remark")
     summary = Text(procedure.summary[:1].upper() + procedure.summary[1:] + ".")
     check = Text("\n".join(f"[ ] {line}" for line in checks(plan)))
     by_hand = Group(Text("\nCheck by hand", style="bold"), check)

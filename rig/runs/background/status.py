@@ -161,7 +161,7 @@ class Status:
         write_whole(file(self.key, "json"), json.dumps(asdict(self)))
 
 
-LEAST_FREE = 1 << 18  # bytes; with fewer, a process may have ended without words
+LEAST_FREE = 1 << 18  # bytes; with fewer, a process may have ended without a message
 NOT_BEGUN = "it was stopped before the run began"
 
 
@@ -202,9 +202,9 @@ def _status_of_killed(status: Status) -> Status:
 
 
 def _count_stored(run: Run, seen_poses: int, total: int) -> tuple[int, int]:
-    """The poses of a run that has ended, and how many it wanted. A signal can come before a stored one is counted.
+    """The number of poses of a run that has ended, and of its plan. A signal can come before a stored one is counted.
 
-    A run that is complete before its planned end, because its target is reached, wants no more.
+    A run that is complete before its planned end, because its target is reached, has all its poses.
     """
     stored = max(run.rows, seen_poses) if total else 0
     return stored, stored if run.state == "complete" else total

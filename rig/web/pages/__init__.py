@@ -1,4 +1,4 @@
-"""The pages of the workbench: each registers itself for its address; an address without a page leads back to them."""
+"""The pages of the workbench: each registers itself for its address; an address without a page shows links to them."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ TITLES = {
 LEGENDS = {
     "allan": "●: measured, with 95 % interval; line: model",
     "spectrum": "●: measured; grey band: 95 % of them by the model",
-    "ratio": "where the interval leaves 1, the model fails",
+    "ratio": "the model fails where the interval does not contain 1",
     "waterfall": "bar: fit; ◆ the half of the record not used in the fit; grey: chance alone",
     "record": "",
 }

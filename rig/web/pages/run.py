@@ -36,7 +36,7 @@ from rig.web.parts import box, button, div, facts, message, show_error, shown, t
 
 MOST_STRETCHES = 12
 DEFAULT_PROCEDURE = "sweep"
-OTHER_BENCH = "Another bench of the list Measure on may have it."
+OTHER_BENCH = "Another bench in the list Measure on may have it."
 
 
 def register(desk: Desk) -> None:
@@ -189,7 +189,7 @@ class PlanForm:
         self.meant.set_visibility(False)
         self.optimal.set_visibility(False)
         with self.plan:
-            unknown = f"There is no procedure {self.asked!r} on this bench; choose one of the list Procedure."
+            unknown = f"There is no procedure {self.asked!r} on this bench; choose one from the list Procedure."
             show_error("This procedure is not known", unknown)
 
     @property

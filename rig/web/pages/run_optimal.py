@@ -57,7 +57,7 @@ class OptimalDialog:
         """Choose the poses, and compare them with the standard sweep."""
         self.choose.disable()
         with afresh(self.place):
-            waiting("Choosing the poses; nothing moves. This takes up to some minutes.")
+            waiting("Choosing the poses; nothing moves. This takes a few minutes at most.")
             ui.button("Stop choosing", icon="close", on_click=self.visit.cancel).props("dense flat")
         try:
             choice = await self.visit.work(self._optimal)

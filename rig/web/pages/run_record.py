@@ -134,7 +134,9 @@ class OverTime:
         for select in (self.kind, self.name):
             select.style("min-width: 150px")
         self.head.set_visibility(False)
-        with div("") as self.place:  # with the page: a script that loads later is late where the connection was lost
+        with div(
+            ""
+        ) as self.place:  # with the page: a script that loads later would be missing after a loss of the connection
             self.plot = empty_plot("the run over time", "live-plot")
         self.place.set_visibility(False)
         self.time = RunTime()
@@ -350,7 +352,7 @@ def _results(run: Run) -> None:
 
 
 def shortened(name: str, value: str) -> str:
-    """The beginning of a long setting; the message of a run is whole, because its end says what to do."""
+    """The beginning of a long setting; the message of a run is complete, because its end has the remedy."""
     return value if name == MESSAGE or len(value) <= SHOWN else f"{value[:SHOWN]} ..."
 
 
