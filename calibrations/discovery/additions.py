@@ -48,11 +48,22 @@ def additions(structure: Structure, model: Model, effects: Mapping[str, Effect])
     """The catalogue effects that the structure adds to a model: the largest place first, then geometry."""
     causes = [cause for place in structure.places for cause in (*place.causes, *structure.refinements(place))]
     names = dict.fromkeys([*causes, *structure.geometry.causes, *structure.geometry.refinements])
-    starts = {
-        c: tuple(Estimate(name, axis, value, None, "") for name, axis, value in structure.starts(c)) for c in names
-    }
     possible = [c for c in names if c in effects and effects[c].excluded(structure.result.data.table) is None]
-    return [Addition(effects[c], structure.constants(c), starts[c]) for c in possible if not model.holds(c)]
+    return [
+        Addition(effects[c], structure.constants(c), _start_estimates(structure, effects[c]))
+        for c in possible
+        if not model.holds(c)
+    ]
+
+
+def _start_estimates(structure: Structure, effect: Effect) -> tuple[Estimate, ...]:
+    """The values from which the fit of a cause starts; one that the search has for all axes holds for each."""
+    each_axis = {p.name for p in effect.parameters if p.per_axis}
+    return tuple(
+        Estimate(name, axis, value, None, "")
+        for name, given_axis, value in structure.starts(effect.name)
+        for axis in (structure.result.data.axes if not given_axis and name in each_axis else (given_axis,))
+    )
 
 
 def free_additions(structure: Structure, model: Model) -> list[Addition]:

@@ -38,13 +38,12 @@ from calibrations.fitting.requested_forms import BASE, effects_beyond_base
 from calibrations.free_forms.acting_places import ActingPlace
 from calibrations.free_forms.geometry import GEOMETRY, GeometryEffects
 from calibrations.free_forms.naming import NAMED_ALONE
-from calibrations.free_forms.place_names import PREFIX
+from calibrations.free_forms.place_names import PREFIX, place_of_effect
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.search import search
 from calibrations.free_forms.stairs import before_stairs, find_stairs, fit_stairs, noise_of_rounded
 from calibrations.free_forms.structure import FloorSource, Structure, find_structure, with_stairs
 from calibrations.means.noise import rms, with_white
-from calibrations.model import Estimate
 from calibrations.model.chain import force
 from calibrations.progress import report
 from calibrations.table import Array
@@ -207,7 +206,8 @@ def _without_idle_additions(
     the search takes the sum. All are left out at once, or, where the unseen error grows by that, one after another.
     An `insignificant` cause may have lowered the error until a later one described its part too: each of these is left
     out by itself. The effects that are `needed` are kept. Beside a converter that rounds, the unseen error alone
-    decides: what was added before its steps may have followed them, and no linearised test is valid.
+    decides: what was added before its steps may have followed them, and no linearised test is valid. A cause is not
+    left out while the curve of its place stays, which describes it.
     """
     base, end = fits[0], fits[-1]
     remaining = {
@@ -223,7 +223,7 @@ def _without_idle_additions(
     kept, without = selected, end
     for left_out in (idle, *([addition] for addition in idle if len(idle) > 1), *([cause] for cause in described)):
         fewer = [a for a in kept if a not in left_out]
-        if not fewer or len(fewer) == len(kept):
+        if not fewer or len(fewer) == len(kept) or _described_by_curves(left_out, fewer):
             continue
         alternative = fit_together(base, fewer)
         if alternative.held_out_excess <= NO_WORSE * end.held_out_excess:
@@ -231,6 +231,12 @@ def _without_idle_additions(
     if len(kept) == len(selected):
         return selected, fits
     return kept, [base, *fit_successively(base, without, kept)]
+
+
+def _described_by_curves(left_out: Sequence[Addition], kept: Sequence[Addition]) -> bool:
+    """Whether the curve of its place describes each effect that is left out."""
+    curves = {a.effect.name for a in kept}
+    return all(f"{PREFIX}{place_of_effect(a.effect.name)}" in curves for a in left_out)
 
 
 @dataclass(frozen=True)
@@ -320,10 +326,7 @@ def _fit_before_stairs(base: Fit, effects: Mapping[str, Effect]) -> tuple[Fit, _
     if stairs.of_means:
         white = noise_of_rounded(places.result.state.predicted, white, stairs)
         base = fit(base.model, with_white(base.table, white))
-    values = {"step": stairs.step, "offset": stairs.offset, "noise": stairs.noise}
-    rounding = Addition(
-        effects[STAIRS], {}, tuple(Estimate(name, "", value, None, "") for name, value in values.items())
-    )
+    rounding = Addition(effects[STAIRS], {}, stairs.estimates(base.table.axes))
     end, unconverted = (fit_together(base, [*causes, *stage, *forms]) for stage in ([rounding], []))
     if unconverted.pooled_excess < NO_WORSE * end.pooled_excess:
         return base, None, 1.0  # as well without: a regular sweep gathers outputs by itself
