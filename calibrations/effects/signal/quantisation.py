@@ -47,10 +47,10 @@ class Quantisation(Effect):
         guess=lambda table: _start(table, 0),
         doc="from one code to the next",
     )
-    offset = Parameter("{out}", typical=1e-4, guess=lambda table: _start(table, 1), doc="of a code")
+    offset = Parameter("{out}", typical=1e-3, guess=lambda table: _start(table, 1), doc="of a code")
     noise = Parameter(
         "{out}",
-        typical=1e-4,
+        typical=1e-3,
         low=0.0,
         guess=lambda table: _start(table, 2),
         doc="of a sample, before it is rounded",
