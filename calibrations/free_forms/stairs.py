@@ -95,7 +95,9 @@ def find_stairs(table: Table, linear: Array, white: Array) -> Stairs | None:
         return None
     excess = _measure_concentration(channels, f) - _measure_concentration(linear, f)
     best = int(np.argmax(excess))
-    if excess[best] < max(GATHERED, BY_CHANCE * float(np.sqrt(np.log(len(f)) / channels.size))):
+    different = len(channels) * len(np.unique(np.round(linear / span, 6), axis=1).T)  # poses, not visits
+    by_chance, by_few_poses = (BY_CHANCE * float(np.sqrt(np.log(len(f)) / k)) for k in (channels.size, different))
+    if excess[best] < max(GATHERED, by_chance) or by_few_poses >= 1.0:  # few poses gather anywhere
         return None
     fine = f[best] + np.linspace(-1, 1, 81) / (POINTS * span)
     frequency = float(fine[int(np.argmax(_measure_concentration(channels, fine)))])
