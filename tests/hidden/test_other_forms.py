@@ -52,6 +52,12 @@ def sagging(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Arra
     return v + tilt[:, None] * np.column_stack([np.sin(heading), -np.cos(heading)])
 
 
+def leaning(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
+    """A sensor whose case leans on its adhesive as it warms up, by 0.1 deg."""
+    lean = np.radians(0.1) * heated(poses) * np.array([0.6, 0.8])
+    return v + lean * np.cos(np.radians(poses.alpha_deg))[:, None]
+
+
 def hummed(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
     """Mains, as the pace of the poses shows them: a wave in 7.3 poses."""
     phase = 2 * np.pi * poses.t_s[:, None] / (7.3 * sampled.PERIOD_S)
@@ -85,6 +91,7 @@ NAMELESS: dict[sampled.Cause, str] = {
     magnetised: "beta-bias",
     wound: "beta-bias",
     sagging: "tilt-over-time",
+    leaning: "temperature-axes",
 }  # causes that no effect of the catalogue describes, and the places where they act
 
 
