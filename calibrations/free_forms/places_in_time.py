@@ -19,6 +19,7 @@ from calibrations.table import Array
 WARMING = (0.04, 0.15, 0.6)  # of the record: time constants
 AGES = 8  # intervals of the logarithm of the time since the record's beginning
 SHORTEST_PART = 1e-3  # the same: shorter ones are over before the second pose
+LONGEST_PART = 1.0  # the same: what a longer one would describe is a drift
 LEADS_S = (0.0, -90.0, 90.0)  # by which the sensor is ahead of the thermometer
 LONG_LEADS_S = (-300.0, 300.0)  # the same at rest, where an oven warms a whole fixture
 WAVES, WALK_WAVES = 24, 160  # of slow noise, and of a random walk, whose roughness is never small
@@ -213,7 +214,7 @@ def _make_warm_up(
     """An exponential approach by its time constant, as a share of the record."""
 
     def at(shape: tuple[float, ...]) -> Component:
-        part = max(shape[0], SHORTEST_PART)
+        part = min(max(shape[0], SHORTEST_PART), LONGEST_PART)
         decay = np.exp(-u / part)[:, None]
         return Component(
             name, place, "response", cause, f"{place}/{cause}", price,

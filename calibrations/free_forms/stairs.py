@@ -20,7 +20,6 @@ from calibrations.free_forms.chain import State
 from calibrations.free_forms.components import Component, Starts
 from calibrations.free_forms.poses import PoseData
 from calibrations.means.noise import with_white
-from calibrations.model import Estimate
 from calibrations.table import Array, Table
 
 FEWEST_STEPS = 3  # in the range of the outputs
@@ -66,15 +65,6 @@ class Stairs:
     def rms(self) -> float:
         """Of the rounding error where noise hardly smooths it."""
         return float(np.sqrt(np.mean(self.step**2) / 12))
-
-    def estimates(self, axes: Sequence[str]) -> tuple[Estimate, ...]:
-        """The values of quantisation's parameters."""
-        values = {"step": self.step, "offset": self.offset, "noise": np.full_like(self.step, self.noise)}
-        return tuple(
-            Estimate(name, axis, float(value), None, "")
-            for name, of_axes in values.items()
-            for axis, value in zip(axes, of_axes.ravel(), strict=True)
-        )
 
 
 def find_stairs(table: Table, linear: Array, white: Array) -> Stairs | None:
