@@ -22,7 +22,7 @@ from calibrations.effects import Values
 from calibrations.effects.logged import sensor_temperature_c
 from calibrations.free_forms.bases import Clips, Products, Ramp, Spline, StraightLine
 from calibrations.free_forms.effect import FreeForm, coefficients_of
-from calibrations.free_forms.form import CROSS, Form
+from calibrations.free_forms.form import CROSS, OUT_OF_PLANE, Form
 from calibrations.table import Array
 
 PARTS = 8  # of a piece, whose bounds are taken together
@@ -114,6 +114,10 @@ def _part(form: Form, u: Array, a: Sequence[Node], v: Node, table: RunTime, k: i
     f = _function(form, u, a, v, table, k)
     if form.factor == "force":
         return a[k] * f
+    if form.factor == "cross":
+        return a[CROSS[k]] * f
+    if form.factor == "out-of-plane":
+        return a[OUT_OF_PLANE[k]] * f
     if form.factor == "load":
         return abs(a[CROSS[k]]) * f
     if form.factor:
@@ -143,7 +147,7 @@ def _function(form: Form, u: Array, a: Sequence[Node], v: Node, table: RunTime, 
 def _driver(form: Form, a: Sequence[Node], v: Node, table: RunTime, k: int) -> Node:
     """The driver of a function of axis k."""
     if form.driver in ("own", "cross", "out-of-plane"):
-        return a[{"own": k, "cross": CROSS[k], "out-of-plane": (2, 2, 1)[k]}[form.driver]]
+        return a[{"own": k, "cross": CROSS[k], "out-of-plane": OUT_OF_PLANE[k]}[form.driver]]
     if form.driver == "output":
         return v
     if form.driver == "temperature":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from calibrations.fitting.problem_kinds import make_problem
 from calibrations.free_forms.effect import free_form
 from calibrations.free_forms.geometry import GEOMETRY
 from calibrations.free_forms.place_names import PREFIX, place_of_effect
+from calibrations.free_forms.stairs import Stairs
 from calibrations.free_forms.structure import Structure
 from calibrations.model import Estimate, Model, Term
 from calibrations.model.chain import forward
@@ -48,17 +49,47 @@ def additions(structure: Structure, model: Model, effects: Mapping[str, Effect])
     """The catalogue effects that the structure adds to a model: the largest place first, then geometry."""
     causes = [cause for place in structure.places for cause in (*place.causes, *structure.refinements(place))]
     names = dict.fromkeys([*causes, *structure.geometry.causes, *structure.geometry.refinements])
-    starts = {
-        c: tuple(Estimate(name, axis, value, None, "") for name, axis, value in structure.starts(c)) for c in names
-    }
     possible = [c for c in names if c in effects and effects[c].excluded(structure.result.data.table) is None]
-    return [Addition(effects[c], structure.constants(c), starts[c]) for c in possible if not model.holds(c)]
+    return [
+        Addition(effects[c], structure.constants(c), _start_estimates(structure, effects[c]))
+        for c in possible
+        if not model.holds(c)
+    ]
+
+
+def _start_estimates(structure: Structure, effect: Effect) -> tuple[Estimate, ...]:
+    """The values from which the fit of a cause starts; one that the search has for all axes holds for each."""
+    each_axis = {p.name for p in effect.parameters if p.per_axis}
+    return tuple(
+        Estimate(name, axis, value, None, "")
+        for name, given_axis, value in structure.starts(effect.name)
+        for axis in (structure.result.data.axes if not given_axis and name in each_axis else (given_axis,))
+    )
+
+
+def rounding_addition(effect: Effect, stairs: Stairs, axes: Sequence[str]) -> Addition:
+    """The quantisation of a coarse converter, from its stairs."""
+    values = {"step": stairs.step, "offset": stairs.offset, "noise": np.full_like(stairs.step, stairs.noise)}
+    estimates = [
+        Estimate(name, axis, float(value), None, "")
+        for name, of_axes in values.items()
+        for axis, value in zip(axes, of_axes.ravel(), strict=True)
+    ]
+    return Addition(effect, {}, tuple(estimates))
 
 
 def free_additions(structure: Structure, model: Model) -> list[Addition]:
     """The free forms that the structure adds to a model, the largest place first."""
     free = [Addition(free_form(forms)) for forms in structure.free_forms]
     return [a for a in free if not model.holds(a.effect.name)]
+
+
+def fit_each_axis(start: Fit, names: list[str], effects: Mapping[str, Effect]) -> Fit:
+    """The fit in which each axis has its own value of these effects."""
+    model = start.model
+    for name in names:
+        model = model.with_effect(effects[name])
+    return refit(start, model) if names else start
 
 
 def fit_separately(base: Fit, structure: Structure, added: list[Addition]) -> list[Addition]:
@@ -167,6 +198,13 @@ def without_forms(end: Fit) -> Fit:
     steps = (fit_.problem.layout.steps(fit_.theta) for fit_ in (end, fitted))
     with_parts, without_parts = (forward(end.table, chain_steps).T for chain_steps in steps)
     return fit(model, _without_part(end.table, with_parts - without_parts))
+
+
+def predicted_before(end: Fit, name: str) -> Array:
+    """Outputs that a fitted model predicts without one of its effects, (channels, n), in their unit."""
+    without = evaluate(end.model.without(name), end.table)
+    assert without is not None  # noqa: S101 every parameter has been fitted
+    return np.asarray(end.table.outputs.T - without.residual)
 
 
 def at_values_of(end: Fit, added: list[Addition]) -> list[Addition]:

@@ -14,12 +14,12 @@ from functools import cached_property, reduce
 import numpy as np
 
 from calibrations.criteria import CLEARLY_BETTER, MATERIAL, PATTERN_BETTER, SIGNIFICANT
-from calibrations.discovery.additions import BASIC, Addition, at_values_of, fit_one_by_one
+from calibrations.discovery.additions import BASIC, Addition, at_values_of, fit_each_axis, fit_one_by_one
 from calibrations.discovery.candidates import RowCandidate, candidates, refit_with, with_rivals
 from calibrations.discovery.curves import CurveRows
 from calibrations.discovery.search import first_order_cost
 from calibrations.discovery.significance import chance
-from calibrations.discovery.structural import StructuralSearch, fit_each_axis
+from calibrations.discovery.structural_search import StructuralSearch
 from calibrations.effects import Effect
 from calibrations.errors import TooFewRows
 from calibrations.fitting.determined import loses_parameters

@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from calibrations.design.experiment import Experiment
     from calibrations.discovery.dataset import Dataset
     from calibrations.discovery.patterns import Pattern
-    from calibrations.discovery.structural import StructuralSearch
+    from calibrations.discovery.structural_search import StructuralSearch
 
 SCATTER_IS_NOISE = (
     "The noise floor is the scatter of the poses. It is larger than the standard deviation and the number of samples "

@@ -7,7 +7,7 @@ and so does a place without a cause: the error falls, and the cause remains unkn
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from calibrations.criteria import MATERIAL, MOST_UNEXPLAINED, SIGNIFICANT
@@ -18,6 +18,7 @@ from calibrations.discovery.additions import (
     additions,
     at_values_of,
     causes_alone,
+    fit_each_axis,
     fit_gradually,
     fit_one_by_one,
     fit_separately,
@@ -25,26 +26,25 @@ from calibrations.discovery.additions import (
     fit_together,
     free_additions,
     largest_first,
+    predicted_before,
+    rounding_addition,
     start_small_at_forms,
 )
-from calibrations.discovery.candidates import RowCandidate, candidates, with_planned, with_rivals
-from calibrations.discovery.findings import Step
+from calibrations.discovery.candidates import RowCandidate
 from calibrations.discovery.search import first_order_cost
 from calibrations.discovery.significance import chance
+from calibrations.discovery.structural_search import StructuralSearch
 from calibrations.effects import Effect
-from calibrations.fitting.fit import Fit, fit, refit, with_least_white
+from calibrations.fitting.fit import Fit, fit, with_least_white
 from calibrations.fitting.problem_kinds import make_problem
 from calibrations.fitting.requested_forms import BASE, effects_beyond_base
-from calibrations.free_forms.acting_places import ActingPlace
 from calibrations.free_forms.geometry import GEOMETRY, GeometryEffects
-from calibrations.free_forms.naming import NAMED_ALONE
-from calibrations.free_forms.place_names import PREFIX
+from calibrations.free_forms.place_names import PREFIX, place_of_effect
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.search import search
-from calibrations.free_forms.stairs import before_stairs, find_stairs, fit_stairs, noise_of_rounded
+from calibrations.free_forms.stairs import Stairs, before_stairs, find_stairs, fit_stairs, noise_of_rounded
 from calibrations.free_forms.structure import FloorSource, Structure, find_structure, with_stairs
 from calibrations.means.noise import rms, with_white
-from calibrations.model import Estimate
 from calibrations.model.chain import force
 from calibrations.progress import report
 from calibrations.table import Array
@@ -53,71 +53,6 @@ STAIRS = "quantisation"
 AS_SEARCHED = 1.1  # times the error of a search that follows noise: a fit with a smaller error needs no new search
 IDLE = 0.99  # of the error before: an addition that is no cause and leaves a larger error may be left out
 NEARLY = 1.5  # noise floors: with a larger error, the stairs are wrong
-
-
-@dataclass(frozen=True)
-class StructuralSearch:
-    """The end of a search: the given model, the steps beyond it, and the places that act.
-
-    `named`: effects of the catalogue that are causes; `rivals`: by cause, what the data cannot separate from it.
-    `candidates`: every effect of the catalogue alone on top of the given model.
-    `causes_alone`: the last model without its free forms.
-    """
-
-    start: Fit
-    steps: tuple[Step[Fit], ...]
-    candidates: tuple[RowCandidate, ...]
-    causes_alone: Fit
-    places: tuple[ActingPlace, ...] = ()
-    named: tuple[str, ...] = ()
-    rivals: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()
-
-    @classmethod
-    def of_fits(
-        cls,
-        start: Fit,
-        freed: list[str],
-        added: list[Addition],
-        fits: list[Fit],
-        effects: Mapping[str, Effect],
-        ranked: Sequence[RowCandidate] = (),
-    ) -> StructuralSearch:
-        """The search whose steps are the effects `freed`, up to the first of the `fits`, and then the additions.
-
-        `ranked`: the candidates on `start`, if they are known.
-        """
-        floor = fits[-1].noise.scatter
-        start, fits = start.in_floor(floor), [fitted.in_floor(floor) for fitted in fits]
-        steps = _steps(start, freed, fits[0], effects)
-        steps += [Step(a.effect.name, *pair) for a, pair in zip(added, pairwise(fits), strict=True)]
-        if not ranked:
-            report("testing each effect alone")
-            ranked = candidates(start, effects)
-        ranked = _first(start, steps, ranked)
-        forms = [a for a in added if a.effect.name.startswith(PREFIX)]
-        return cls(start, tuple(steps), ranked, causes_alone(fits[-1], forms))
-
-    @property
-    def end(self) -> Fit:
-        """The last fit."""
-        return self.steps[-1].after if self.steps else self.start
-
-    @property
-    def causes(self) -> tuple[str, ...]:
-        """Effects of the steps that are causes."""
-        names = {step.name for step in self.steps}
-        return tuple(cause for cause in self.named if cause in names)
-
-    @property
-    def alternatives(self) -> dict[str, tuple[str, ...]]:
-        """By cause, the effects that the data cannot separate from it."""
-        rivals_by_cause = {name: self.rivals.get(name, ()) for name in self.causes}
-        of_other_form = {cause for place in self.places if place.share < NAMED_ALONE for cause in place.causes}
-        if self.candidates and self.causes == (self.candidates[0].name,) and not of_other_form & set(self.causes):
-            name, rivals_alone = self.candidates[0].name, self.candidates[0].indistinguishable_from
-            rivals_by_cause[name] = tuple(dict.fromkeys([*rivals_by_cause[name], *rivals_alone]))
-        return {name: rivals for name, rivals in rivals_by_cause.items() if rivals}
 
 
 def search_structure(
@@ -207,7 +142,8 @@ def _without_idle_additions(
     the search takes the sum. All are left out at once, or, where the unseen error grows by that, one after another.
     An `insignificant` cause may have lowered the error until a later one described its part too: each of these is left
     out by itself. The effects that are `needed` are kept. Beside a converter that rounds, the unseen error alone
-    decides: what was added before its steps may have followed them, and no linearised test is valid.
+    decides: what was added before its steps may have followed them, and no linearised test is valid. A cause is not
+    left out while the curve of its place stays, which describes it.
     """
     base, end = fits[0], fits[-1]
     remaining = {
@@ -223,7 +159,7 @@ def _without_idle_additions(
     kept, without = selected, end
     for left_out in (idle, *([addition] for addition in idle if len(idle) > 1), *([cause] for cause in described)):
         fewer = [a for a in kept if a not in left_out]
-        if not fewer or len(fewer) == len(kept):
+        if not fewer or len(fewer) == len(kept) or _described_by_curves(left_out, fewer):
             continue
         alternative = fit_together(base, fewer)
         if alternative.held_out_excess <= NO_WORSE * end.held_out_excess:
@@ -231,6 +167,12 @@ def _without_idle_additions(
     if len(kept) == len(selected):
         return selected, fits
     return kept, [base, *fit_successively(base, without, kept)]
+
+
+def _described_by_curves(left_out: Sequence[Addition], kept: Sequence[Addition]) -> bool:
+    """Whether the curve of its place describes each effect that is left out."""
+    curves = {a.effect.name for a in kept}
+    return all(f"{PREFIX}{place_of_effect(a.effect.name)}" in curves for a in left_out)
 
 
 @dataclass(frozen=True)
@@ -318,45 +260,31 @@ def _fit_before_stairs(base: Fit, effects: Mapping[str, Effect]) -> tuple[Fit, _
     forms = free_additions(places, smooth.model)
     stairs = fit_stairs(base.table, places.result.state.predicted, white, stairs)
     if stairs.of_means:
-        white = noise_of_rounded(places.result.state.predicted, white, stairs)
-        base = fit(base.model, with_white(base.table, white))
-    values = {"step": stairs.step, "offset": stairs.offset, "noise": stairs.noise}
-    rounding = Addition(
-        effects[STAIRS], {}, tuple(Estimate(name, "", value, None, "") for name, value in values.items())
-    )
-    end, unconverted = (fit_together(base, [*causes, *stage, *forms]) for stage in ([rounding], []))
+        base = _with_edges_at(base, places.result.state.predicted, white, stairs)
+    rounding = rounding_addition(effects[STAIRS], stairs, base.table.axes)
+    added = [*causes, rounding, *forms]
+    end = fit_together(base, added)
+    if stairs.of_means:  # the edges between two codes, once more where this fit has them
+        nearer = _with_edges_at(base, predicted_before(end, STAIRS), white, stairs)
+        renewed = fit_together(nearer, at_values_of(end, added))
+        base, end = (nearer, renewed) if _unseen_error(renewed) < _unseen_error(end) else (base, end)
+    unconverted = fit_together(base, [*causes, *forms])
     if unconverted.pooled_excess < NO_WORSE * end.pooled_excess:
         return base, None, 1.0  # as well without: a regular sweep gathers outputs by itself
-    structure_fit = _StructureFit(with_stairs(places, base.residual, stairs, white), [*causes, rounding], forms, end)
+    assert base.problem.white is not None  # noqa: S101 it is that of the stated noise
+    before_rounding = with_stairs(places, base.residual, stairs, base.problem.white)
+    structure_fit = _StructureFit(before_rounding, [*causes, rounding], forms, end)
     return base, structure_fit, end.share_left(unconverted)
 
 
-def fit_each_axis(start: Fit, names: list[str], effects: Mapping[str, Effect]) -> Fit:
-    """The fit in which each axis has its own value of these effects."""
-    model = start.model
-    for name in names:
-        model = model.with_effect(effects[name])
-    return refit(start, model) if names else start
+def _unseen_error(fit: Fit) -> float:
+    """Error on unseen poses in the output's unit: the floors of two fits may differ."""
+    return fit.held_out_excess * float(rms(fit.noise.floor))
 
 
-def _steps(start: Fit, names: list[str], base: Fit, effects: Mapping[str, Effect]) -> list[Step[Fit]]:
-    """A step for each effect that was freed; the last ends at `base`."""
-    fits = [start, *(fit_each_axis(start, names[: k + 1], effects) for k in range(len(names) - 1)), base]
-    return [Step(name, *pair) for name, pair in zip(names, pairwise(fits[: len(names) + 1]), strict=True)]
-
-
-def _first(start: Fit, steps: list[Step[Fit]], ranked: Sequence[RowCandidate]) -> tuple[RowCandidate, ...]:
-    """The candidates on the given model, those of the steps first, the first one with the errors of its full fit.
-
-    A single cause has the rivals of the search that adds effects; several causes have none here.
-    """
-    if not steps:
-        return tuple(ranked)
-    first_effect, *other_candidates = with_planned(ranked, steps)
-    single = sum(not step.name.startswith(PREFIX) for step in steps) == 1
-    if single and not first_effect.name.startswith(PREFIX):
-        first_effect = with_rivals(first_effect, ranked, start)
-    return first_effect, *other_candidates
+def _with_edges_at(base: Fit, unrounded: Array, white: Array, stairs: Stairs) -> Fit:
+    """The fit with the noise that rounded means have about the expected ones, (channels, n)."""
+    return fit(base.model, with_white(base.table, noise_of_rounded(unrounded, white, stairs)))
 
 
 def structure(start: Fit, effects: Mapping[str, Effect], before: Structure | None = None) -> Structure:

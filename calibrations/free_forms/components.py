@@ -35,7 +35,7 @@ class Component:
     form      the free form that it is, or that takes the place of the effect's own form
     shape     values in which the columns are not linear; `step` by which they are first changed
     constants by which the catalogue effect is the same function, such as the thermometer's lead
-    starts    values of the effect's parameters, (parameter, axis or "", value), from the coefficients of the columns
+    starts    values of the effect's parameters, (parameter, axis or "" for all, value), from the columns' coefficients
     contains  the effect that its cause becomes where the shape vanishes
     error     relative rms error of what drives it, a column without the scatter of its readings
     """

@@ -14,6 +14,8 @@ column:NAME   a logged column                           its own
 
 factor        what f is multiplied by
 force         specific force along the own axis, g
+cross         along the other axis in the plane, g
+out-of-plane  along the axis out of the plane, g
 side          side of beta's last move, +-1
 load          magnitude of the force along the other axis, g
 pressed       not multiplied: limits of slip elements grow by that magnitude
@@ -35,8 +37,9 @@ from calibrations.free_forms.poses import side, turning_forces
 from calibrations.geometry.orientation import other_in_plane, out_of_plane, reported_force
 from calibrations.table import Array, Table
 
-Factor = Literal["", "force", "side", "load", "pressed"]
+Factor = Literal["", "force", "cross", "out-of-plane", "side", "load", "pressed"]
 CROSS = (1, 0, 0)  # of x, y, z: the other axis in the plane
+OUT_OF_PLANE = (2, 2, 1)  # the same: the axis out of the plane
 ANGLES = ("alpha", "beta")
 TILT = "tilt-over-time"  # the place of a base that turns slowly, and of a sensor that turns on its stage
 TURNED = {"about-x": "tilt", "about-y": "alpha", "about-z": "beta"}  # the angle that each of its forms changes
@@ -165,6 +168,10 @@ class Form:
     def _factor(self, table: Table, force: Array, k: int) -> Array:
         if self.factor == "force":
             return force[:, k]
+        if self.factor == "cross":
+            return force[:, CROSS[k]]
+        if self.factor == "out-of-plane":
+            return out_of_plane(force)[:, k]
         if self.factor == "load":
             return np.abs(force[:, CROSS[k]])
         return side(table, self.approach_deg)

@@ -9,6 +9,7 @@ from scipy.special import betaincc  # scipy.stats takes 0.4 s to load
 
 from calibrations.criteria import SIGNIFICANT
 from calibrations.free_forms.components import Component
+from calibrations.free_forms.places_in_time import LONGEST_PART
 from calibrations.free_forms.search_result import SearchResult
 from calibrations.free_forms.shapes import climb
 from calibrations.table import Array
@@ -20,6 +21,7 @@ NAMED = 0.9  # of a place's variance: the least that the forms must explain toge
 NAMED_ALONE = 0.5  # the same for the only effect of its place that the curve resembles at all: most of the curve
 MOST_FORMS = 2  # forms, at most, that only approximate a curve
 MOST_NAMES = 3  # causes of one curve, at most: four forms, each with a shape of its own, approximate any curve
+DRIFT_LINE = "time-bias/line"
 WARM_UPS = ("warm-up-bias", "warm-up-scale")
 SETTLED = 0.2  # of the record: the longest time constant of what has settled at its end, to less than 1 %
 TWO_MASSES = ((0.04, 0.12), (0.02, 0.06))  # of the record: time constants from which their search starts, and its steps
@@ -80,6 +82,10 @@ def _name_effects(
     walks = {result.component(name).cause for name in names if "/walk-" in name}
     first = [cause for cause in acting_causes if cause and cause not in walks] if walks else []  # walks follow anything
     chosen_causes, share = _select_causes(tuple(columns), acting_causes, first, curve, options_of)
+    if chosen_causes == ("warm-up-bias",) and DRIFT_LINE in names:
+        drift, share_of_drift = _select_causes(["bias-drift"], acting_causes, (), curve, options_of)
+        if drift and 1 - share_of_drift < CLEARLY_LESS**2 * (1 - share):
+            chosen_causes, share = drift, share_of_drift
     causes = _one_name(result, names, chosen_causes, curve, Q)
     if share >= NAMED and len(causes) <= MOST_NAMES:
         return causes, share
@@ -213,9 +219,13 @@ def _residual_at_best(
 def _at_best_shapes(
     result: SearchResult, comps: Sequence[Component], curve: Array, companions: Array, Q: Array
 ) -> list[Array]:
-    """Columns of the components of one cause that have one value of shape, each at the shape that leaves least."""
+    """Columns of the components of one cause that have one value of shape, each at the shape that leaves least.
+
+    A warm-up of the bias with the longest time constant is a drift.
+    """
     shaped = [c for c in comps if c.reshaped and len(c.shape) == 1 and c.form is None and not c.contains]
-    return [_columns_of(result, _residual_at_best(result, c, curve, Q, companions)[1], Q) for c in shaped]
+    best = [_residual_at_best(result, c, curve, Q, companions)[1] for c in shaped]
+    return [_columns_of(result, c, Q) for c in best if c.cause != "warm-up-bias" or c.shape[0] < LONGEST_PART]
 
 
 def _two_masses(

@@ -19,11 +19,13 @@ from calibrations.table import Array
 WARMING = (0.04, 0.15, 0.6)  # of the record: time constants
 AGES = 8  # intervals of the logarithm of the time since the record's beginning
 SHORTEST_PART = 1e-3  # the same: shorter ones are over before the second pose
+LONGEST_PART = 1.0  # the same: what a longer one would describe is a drift
 LEADS_S = (0.0, -90.0, 90.0)  # by which the sensor is ahead of the thermometer
 LONG_LEADS_S = (-300.0, 300.0)  # the same at rest, where an oven warms a whole fixture
 WAVES, WALK_WAVES = 24, 160  # of slow noise, and of a random walk, whose roughness is never small
 PLAYS = (0.05, 0.15, 0.35)  # of the range of temperatures
 BRANCHES = (0.02, 0.035, 0.06, 0.1, 0.17, 0.28, 0.45)  # the same: plays that together are a hysteresis of any shape
+LEAST_CHANGE_G = 0.1  # of the force out of the plane, which is else a bias
 OF_LEVEL = (("level", 1.0),)  # constant of an effect that the temperature drives without the scatter of its readings
 FEWEST_TIMED, FEWEST_NOISE = 12, 20  # rows that can show a function of time, and slow noise
 
@@ -74,6 +76,7 @@ def over_temperature(data: PoseData, first: State) -> list[Component]:
             form_price = price + lead_price if lead else price
             components.append(_warmer(data, first, f"{place}/{place}@{lead:g}", place, factor, form_price)((lead,)))
         components.append(_curve_over_temperature(data, first, place, factor, price)((0.0,)))
+    components += _axes_over_temperature(data, first)
     if data.timed:
         temperature = leading_temperature(data.table, 0.0)
         for part in PLAYS:
@@ -91,6 +94,19 @@ def over_temperature(data: PoseData, first: State) -> list[Component]:
             free(form, first, "temperature-hysteresis", GENERAL, **form_price)
         )  # after transients: it settles as they do
     return components
+
+
+def _axes_over_temperature(data: PoseData, first: State) -> list[Component]:
+    """Sensing axes that turn in the case with the temperature, each by two angles: a part of the other forces."""
+    if data.at_rest:
+        return []
+    smooth = (spline(leading_temperature(data.table, 0.0), 8, order=1),)  # an adhesive expands in a straight line
+    has_inclinations = np.ptp(first.force[:, 2]) > LEAST_CHANGE_G
+    factors: tuple[Factor, ...] = ("cross", "out-of-plane") if has_inclinations else ("cross",)
+    return [
+        free(Form("temperature-axes", factor, "temperature", smooth, factor), first, price=GENERAL, general=True)
+        for factor in factors
+    ]
 
 
 def _middle_play(widths: tuple[float, ...]) -> Callable[[Array], Starts]:
@@ -198,7 +214,7 @@ def _make_warm_up(
     """An exponential approach by its time constant, as a share of the record."""
 
     def at(shape: tuple[float, ...]) -> Component:
-        part = max(shape[0], SHORTEST_PART)
+        part = min(max(shape[0], SHORTEST_PART), LONGEST_PART)
         decay = np.exp(-u / part)[:, None]
         return Component(
             name, place, "response", cause, f"{place}/{cause}", price,

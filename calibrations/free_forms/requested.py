@@ -23,7 +23,7 @@ FEWEST_VALUES = 8  # of what drives a curve
 FEWEST_TEMPERATURES = 4
 FEWEST_INCLINATIONS = 4
 # places that only poses of a rig can show
-OF_STAGES = ("stage-angle-alpha", "stage-angle-beta", "tilt-over-time", "beta-bias", "history")
+OF_STAGES = ("stage-angle-alpha", "stage-angle-beta", "tilt-over-time", "temperature-axes", "beta-bias", "history")
 COLUMN = "column:"
 KNOWN_AS = {"temperature_c": "temperature-bias", "t_s": "time-bias", "alpha_deg": "stage-angle-alpha",
             "beta_deg": "stage-angle-beta"}  # columns whose place has a name of its own  # fmt: skip
@@ -51,6 +51,7 @@ DRIVERS = {
     "beta-bias": _Driver("transduction", "inclinations"),
     "temperature-bias": _Driver("transduction", "temperature"),
     "temperature-scale": _Driver("transduction", "temperature"),
+    "temperature-axes": _Driver("transduction", "temperature"),
     "time-bias": _Driver("transduction", "time"),
     "time-scale": _Driver("transduction", "time"),
     "output": _Driver("output", "axes"),
@@ -170,6 +171,8 @@ def _formula(place: str) -> str:
         return f"{angle} <- {angle} + f({angle})"
     if place == TILT:
         return "the base turns about x, y, z by f_x(t), f_y(t), f_z(t)"
+    if place == "temperature-axes":
+        return "V += a_j f_i(T) + a_z g_i(T)"
     x = {"own-response": "a_i", "cross-response": "a_j", "z-response": "a_z", "output": "V", "force": "a"}
     factor = "a_i " if place.startswith("scale-over") or place.endswith("-scale") else ""
     arguments = {"scale-over-cross": "a_j", "scale-over-z": "a_z", "history": "a, on the way to the pose"}

@@ -50,20 +50,21 @@ SAW_VISIBLE = 2.0  # steps' frequency times the noise of a sample: beyond, nothi
 
 @dataclass(frozen=True)
 class Stairs:
-    """Height of a step, offset of a code, and the noise before the rounding, in the output's unit.
+    """Height of a step and offset of a code, (channels, 1), and the noise before the rounding, in the output's unit.
 
+    Behind a converter, each channel has an offset and a gain of its own.
     `of_means`: whether means were rounded, as in a file with few digits; else samples, of which a mean is taken.
     """
 
-    step: float
-    offset: float
+    step: Array
+    offset: Array
     noise: float
     of_means: bool = False
 
     @property
     def rms(self) -> float:
         """Of the rounding error where noise hardly smooths it."""
-        return self.step / float(np.sqrt(12))
+        return float(np.sqrt(np.mean(self.step**2) / 12))
 
 
 def find_stairs(table: Table, linear: Array, white: Array) -> Stairs | None:
@@ -73,36 +74,56 @@ def find_stairs(table: Table, linear: Array, white: Array) -> Stairs | None:
 
     A sweep's own regular angles gather outputs as well: the linear model has the same angles and no stairs.
     """
-    rounded_means = _stairs_of_means(table.outputs, float(np.sqrt(np.mean(white**2))))
+    rounded_means = _stairs_of_means(table.outputs.T, float(np.sqrt(np.mean(white**2))))
     if rounded_means is not None:
         return rounded_means
     noise = float(np.median(table.optional(table.std_names[0], 0.0)))
-    values, span = table.outputs.T.ravel(), float(np.ptp(table.outputs)) or 1.0
+    channels, span = table.outputs.T, float(np.ptp(table.outputs)) or 1.0
     highest = min(1 / (FINEST * noise) if noise > 0 else np.inf, MOST_FREQUENCIES / POINTS / span)
     f = np.arange(FEWEST_STEPS / span, highest, 1 / (POINTS * span))
     if not len(f):
         return None
-    excess = _measure_concentration(values, f) - _measure_concentration(linear.ravel(), f)
+    excess = _measure_concentration(channels, f) - _measure_concentration(linear, f)
     best = int(np.argmax(excess))
-    if excess[best] < max(GATHERED, BY_CHANCE * float(np.sqrt(np.log(len(f)) / len(values)))):
+    different = len(channels) * len(np.unique(np.round(linear / span, 6), axis=1).T)  # poses, not visits
+    by_chance, by_few_poses = (BY_CHANCE * float(np.sqrt(np.log(len(f)) / k)) for k in (channels.size, different))
+    if excess[best] < max(GATHERED, by_chance) or by_few_poses >= 1.0:  # few poses gather anywhere
         return None
     fine = f[best] + np.linspace(-1, 1, 81) / (POINTS * span)
-    frequency = float(fine[int(np.argmax(_measure_concentration(values, fine)))])
+    frequency = float(fine[int(np.argmax(_measure_concentration(channels, fine)))])
+    width = 3 * float(np.sqrt(np.mean(white**2)))
+    found = [_stairs_of_channel(values, frequency, width) for values in channels]
+    step, offset = np.array(found).T[:, :, None]
+    return Stairs(step, offset, noise or _sample_noise(channels, white, step, offset))
+
+
+def _stairs_of_channel(values: Array, frequency: float, width: float) -> tuple[float, float]:
+    """Step and offset near 1 / frequency at which most outputs of a channel lie within about `width` of a code."""
     middle = float(values.mean())
     phase = float(np.angle(np.mean(np.exp(2j * np.pi * frequency * (values - middle)))))
     step, offset = _with_every_code(values, 1 / frequency, middle + phase / (2 * np.pi * frequency))
-    width = max(3 * float(np.sqrt(np.mean(white**2))), 0.01 * step)
-    step, offset = _sharpen_step(values, step, offset, middle, width)
-    return Stairs(step, offset, noise or _sample_noise(table.outputs.T, white, step, offset))
+    return _sharpen_step(values, step, offset, middle, max(width, 0.01 * step))
 
 
 def _stairs_of_means(outputs: Array, white: float) -> Stairs | None:
     """The stairs where every mean is at a code itself: means that were logged with few digits; else None.
 
-    `white`: noise of a mean, which is then the noise before the rounding. Steps whose rounding error is small beside it
-    are those of the digits of any file.
+    outputs  means, (channels, n)
+    white    noise of a mean, which is then the noise before the rounding
+
+    Steps whose rounding error is small beside this noise are those of the digits of any file.
     """
-    values = np.unique(outputs)
+    found = [_step_of_means(values, white) for values in outputs]
+    steps = [channel for channel in found if channel is not None]
+    if len(steps) < len(found):
+        return None
+    step, offset = np.array(steps).T[:, :, None]
+    return Stairs(step, offset, white, of_means=True)
+
+
+def _step_of_means(means: Array, white: float) -> tuple[float, float] | None:
+    """Step and offset of the codes at which every mean of a channel lies; None if there are none."""
+    values = np.unique(means)
     gaps = np.diff(values)
     gaps = gaps[gaps > SAME_CODE * np.ptp(values)]
     if not len(gaps) or gaps.min() < VISIBLE_ROUNDING * white:
@@ -111,9 +132,7 @@ def _stairs_of_means(outputs: Array, white: float) -> Stairs | None:
     if codes[-1] < FEWEST_STEPS:
         return None
     step, offset = np.polyfit(codes, values, 1)
-    if np.abs(values - offset - step * codes).max() > AT_CODE * step:
-        return None
-    return Stairs(float(step), float(offset), white, of_means=True)
+    return None if np.abs(values - offset - step * codes).max() > AT_CODE * step else (float(step), float(offset))
 
 
 def noise_of_rounded(values: Array, white: Array, stairs: Stairs) -> Array:
@@ -130,10 +149,11 @@ def noise_of_rounded(values: Array, white: Array, stairs: Stairs) -> Array:
     return np.asarray(np.maximum(stairs.step * np.sqrt(np.maximum(variance, 0.0)), white))
 
 
-def _sample_noise(outputs: Array, white: Array, step: float, offset: float) -> float:
+def _sample_noise(outputs: Array, white: Array, step: Array, offset: Array) -> float:
     """The noise of a sample with the greatest likelihood, from the positions of the means between the codes.
 
     outputs, white  means and their standard deviations, (channels, n)
+    step, offset    of each channel, (channels, 1)
 
     If the steps are so coarse that most means have samples of one code only, their standard deviations cannot give it.
     Outputs before the rounding are assumed to be uniform between two codes.
@@ -145,7 +165,7 @@ def _sample_noise(outputs: Array, white: Array, step: float, offset: float) -> f
         density = np.mean(np.exp(-0.5 * ((deviation - np.round(deviation)) / std) ** 2), axis=1)
         return float(np.sum(np.log(np.maximum(density, OUTLIER))))
 
-    return step * max(NOISES, key=likelihood)
+    return float(np.mean(step)) * max(NOISES, key=likelihood)
 
 
 def _with_every_code(values: Array, step: float, offset: float) -> tuple[float, float]:
@@ -172,16 +192,20 @@ def _sharpen_step(values: Array, step: float, offset: float, middle: float, widt
     return best[1], best[2]
 
 
-def _measure_concentration(values: Array, frequencies: Array) -> Array:
-    """|mean of exp(2 pi i f V)| at each of the frequencies, which are equally spaced.
+def _measure_concentration(channels: Array, frequencies: Array) -> Array:
+    """|mean of exp(2 pi i f V)| of each of the `channels` (channels, n), rms, at equally spaced frequencies.
 
-    Each is the sum of a coarse and a fine one, so that few exponentials and a product of matrices give all.
+    Each frequency is the sum of a coarse and a fine one, so that few exponentials and a product of matrices give all.
     """
     few = int(np.ceil(np.sqrt(len(frequencies))))
-    coarse, fine = (
-        np.exp(2j * np.pi * np.outer(part, values)) for part in (frequencies[::few], frequencies[:few] - frequencies[0])
-    )
-    return np.asarray(np.abs(coarse @ fine.T).ravel()[: len(frequencies)] / len(values))
+    squares = np.zeros(len(frequencies))
+    for values in channels:
+        coarse, fine = (
+            np.exp(2j * np.pi * np.outer(part, values))
+            for part in (frequencies[::few], frequencies[:few] - frequencies[0])
+        )
+        squares += np.abs((coarse @ fine.T).ravel()[: len(frequencies)] / len(values)) ** 2
+    return np.asarray(np.sqrt(squares / len(channels)))
 
 
 def before_stairs(table: Table, white: Array, stairs: Stairs) -> Table:
@@ -191,7 +215,8 @@ def before_stairs(table: Table, white: Array, stairs: Stairs) -> Table:
     """
     code = np.round((table.outputs.T - stairs.offset) / stairs.step)
     fraction = (table.outputs.T - stairs.offset) / stairs.step - code  # of a step, beyond the code
-    mean = mean_of_rounded(GRID, 1.0, 0.0, max(stairs.noise / stairs.step, LEAST_NOISE))
+    means = [mean_of_rounded(GRID, 1.0, 0.0, max(stairs.noise / step, LEAST_NOISE)) for step in stairs.step.ravel()]
+    mean = np.array(means)[:, None, :]
     std = np.maximum(white / stairs.step, 1e-3)
     weights = np.exp(-0.5 * ((mean - fraction[..., None]) / std[..., None]) ** 2)
     total = weights.sum(axis=2)
@@ -206,20 +231,34 @@ def before_stairs(table: Table, white: Array, stairs: Stairs) -> Table:
 
 def fit_stairs(table: Table, unrounded: Array, white: Array, stairs: Stairs) -> Stairs:
     """Stairs near those given, fitted to the outputs; `unrounded`: the same before the rounding, (channels, n)."""
-    outputs, middle = table.outputs.T, float(np.mean(unrounded))
-    begins = float(np.round((middle - stairs.offset) / stairs.step))
-    code = stairs.offset + begins * stairs.step  # the code in the middle: there step and offset are independent
+    found = [
+        _fit_channel(outputs, expected, noise, float(step), float(offset), stairs.noise)
+        for outputs, expected, noise, step, offset in zip(
+            table.outputs.T, unrounded, white, stairs.step.ravel(), stairs.offset.ravel(), strict=True
+        )
+    ]
+    step, offset = np.array(found).T[:, :, None]
+    return replace(stairs, step=step, offset=offset)
 
-    def residual(u: Array) -> Array:
-        step, offset = stairs.step * (1 + u[1] * stairs.step / np.ptp(outputs)), code + u[0] * stairs.step
-        return (
-            (outputs - mean_of_rounded(unrounded, step, offset, max(stairs.noise, LEAST_NOISE * step))) / white
-        ).ravel()
+
+def _fit_channel(
+    outputs: Array, unrounded: Array, white: Array, step: float, offset: float, noise: float
+) -> tuple[float, float]:
+    """Step and offset of one channel, near those given, that leave the least of its outputs."""
+    begins = float(np.round((float(np.mean(unrounded)) - offset) / step))
+    code = offset + begins * step  # the code in the middle: there step and offset are independent
+
+    def at(u: tuple[float, float]) -> tuple[float, float]:
+        return step * (1 + u[1] * step / float(np.ptp(outputs))), code + u[0] * step
+
+    def residual(u: tuple[float, float]) -> float:
+        fitted_step, middle = at(u)
+        rounded = mean_of_rounded(unrounded, fitted_step, middle, max(noise, LEAST_NOISE * fitted_step))
+        return float(np.sum(np.abs(outputs - rounded) / white))
 
     grid = np.linspace(-0.1, 0.1, 21)
-    start = min(((a, b) for a in grid for b in grid), key=lambda u: float(np.sum(np.abs(residual(np.array(u))))))
-    step = stairs.step * (1 + start[1] * stairs.step / float(np.ptp(outputs)))
-    return replace(stairs, step=step, offset=code + start[0] * stairs.step - begins * step)
+    fitted_step, middle = at(min(((a, b) for a in grid for b in grid), key=residual))
+    return fitted_step, middle - begins * fitted_step
 
 
 def find_saw(

@@ -23,6 +23,7 @@ from calibrations.free_forms.search import search
 from calibrations.free_forms.search_result import SearchResult
 from calibrations.free_forms.selection import ENTER
 from calibrations.free_forms.stairs import SAW, Stairs
+from calibrations.free_forms.transients import is_over_soon, is_unsettled
 from calibrations.geometry.orientation import out_of_plane
 from calibrations.geometry.smooth import smooth_columns
 from calibrations.means.noise import neighbour_std, neighbours_contradict, robust_std
@@ -34,7 +35,6 @@ RESOLVED = 1e-9  # of the range of an output: no converter resolves less, and ro
 LEAST_WHITE = 0.1  # the same: the noise that such a mean is given, though its samples show none
 OUTLYING = 4.0  # times the usual residual: more counts as so much
 SEEN_FORM = 0.9  # of a place's variance: the form of the catalogue itself, not one near it
-FIRST_POSES, OVER_SOON = 0.06, 0.8  # of a record, and of the variance of what decays within them
 KEPT = 0.1  # noise floors: rough columns that together add less are left out of a form
 STAGE_ANGLES = frozenset({"stage-angle-alpha", "stage-angle-beta"})
 LINEAR = {"cross-response": "cross", "z-response": "out-of-plane"}  # places with a linear part, and their drivers
@@ -114,25 +114,25 @@ class Structure:
         alternatives_by_cause = {
             c: p.inseparable_from for p in self.places if p.material for c in p.causes if p.inseparable_from
         }
-        if any("hysteresis" in place.causes for place in self.places):
-            alternatives_by_cause |= {
-                c: tuple(sorted({*alternatives_by_cause.get(c, ()), "hysteresis"})) for c in self._short_lived
-            }
+        for cause, alternative in self._transients.items():
+            alternatives_by_cause[cause] = tuple(sorted({*alternatives_by_cause.get(cause, ()), alternative}))
         return alternatives_by_cause | dict(self.geometry.alternatives or {})
 
     @property
-    def _short_lived(self) -> tuple[str, ...]:
-        """Causes that decay within the first poses, as the memory of what came before them does."""
+    def _transients(self) -> dict[str, str]:
+        """Warm-ups that a hysteresis explains as well, as they are over soon, or a drift, as they are not over."""
         if not self.result.data.timed:
-            return ()
-        first_poses = self.result.data.elapsed_share < FIRST_POSES
-        causes: list[str] = []
+            return {}
+        t = self.result.data.elapsed_share
+        acts = any("hysteresis" in place.causes for place in self.places)
+        alternatives: dict[str, str] = {}
         for place in self.places:
-            curve = max(place.curve, key=np.ptp)
-            squares = (curve - np.median(curve)) ** 2
-            if squares[first_poses].sum() > OVER_SOON * squares.sum():
-                causes += [c for c in place.causes if c.startswith("warm-up")]
-        return tuple(causes)
+            warm_ups = [cause for cause in place.causes if cause.startswith("warm-up")]
+            if acts and warm_ups and is_over_soon(place.curve, t):
+                alternatives |= dict.fromkeys(warm_ups, "hysteresis")
+            elif "warm-up-bias" in warm_ups and "bias-drift" not in place.causes and is_unsettled(place.curve, t):
+                alternatives["warm-up-bias"] = "bias-drift"
+        return alternatives
 
     def others(self, place: ActingPlace | None) -> Array:
         """Contribution of all places but one to the output, (channels, n), in its unit; None: of all places."""

@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 
 SHIPPED = Path(__file__).parents[1] / "models"
 SCHEMA = "rig.model/1"
-COMMON_BEFORE = {"hysteresis.reach"}  # parameters that earlier versions wrote with one value for all axes
+COMMON_BEFORE = {  # parameters that earlier versions wrote with one value for all axes
+    "hysteresis.reach", "quantisation.step", "quantisation.offset", "quantisation.noise",
+}  # fmt: skip
 MOST = 1e12  # of a value in any unit: a fit that starts farther away resolves no change of the outputs
 
 
@@ -206,16 +208,20 @@ def _expression_effect(entry: _Effect, source: str, effects_by_name: Mapping[str
 
 
 def _with_value_for_each_axis(entry: _Effect, effect: Effect) -> _Effect:
-    """The entry with a value for each axis of parameters that an earlier version wrote with one for all axes."""
+    """The entry with a value for each axis of parameters that an earlier version wrote with one for all axes.
+
+    An effect that has no other parameters is tied: one value serves all axes.
+    """
     axes = sorted({p.axis for p in entry.parameters if p.axis is not None})
+    common = [p for p in entry.parameters if p.axis is None and f"{effect.name}.{p.name}" in COMMON_BEFORE]
+    if entry.tied or not common:
+        return entry
+    if not axes and all(f"{effect.name}.{p.name}" in COMMON_BEFORE for p in effect.parameters):
+        return entry.model_copy(update={"tied": True})
     parameters = [
         copy
         for p in entry.parameters
-        for copy in (
-            [p.model_copy(update={"axis": axis}) for axis in axes]
-            if axes and p.axis is None and not entry.tied and f"{effect.name}.{p.name}" in COMMON_BEFORE
-            else [p]
-        )
+        for copy in ([p.model_copy(update={"axis": axis}) for axis in axes] if axes and p in common else [p])
     ]
     return entry.model_copy(update={"parameters": parameters})
 

@@ -28,15 +28,17 @@ from tests.calibrations.fitted import LINEAR, model
 from tests.calibrations.test_compensation import error
 from tests.calibrations.test_compensation_sources import interpreted
 
-OVER_FORCE = Spline(-1.06, 1.06, 8)
+OVER_FORCE, WARM = Spline(-1.06, 1.06, 8), Spline(10.0, 50.0, 6)
 FORMS = {
     "own-response": Form("own-response", "curve", "own", (OVER_FORCE,), sizes=(5e-4, 4e-4)),
     "cross-response": Form("cross-response", "line", "cross", (StraightLine(-1.0, 1.0),), sizes=(2e-3, 1e-3)),
     "z-response": Form("z-response", "curve", "out-of-plane", (OVER_FORCE,), sizes=(5e-4, 4e-4), kept=(5, 3)),
     "scale-over-cross": Form("scale-over-cross", "curve", "cross", (OVER_FORCE,), "force", (5e-4, 4e-4)),
     "force": Form("force", "products", "force", (Products(3),), sizes=(1e-3, 1e-3)),
+    "axes-cross": Form("temperature-axes", "cross", "temperature", (WARM,), "cross", (2e-4, 1e-4)),
+    "axes-z": Form("temperature-axes", "out-of-plane", "temperature", (WARM,), "out-of-plane", (2e-4, 1e-4)),
     "history": Form("history", "friction", "cross", (Ramp(),), "load", (1e-3, 1e-3)),
-    "temperature-bias": Form("temperature-bias", "curve", "temperature", (Spline(10.0, 50.0, 6),), sizes=(1e-3, 0.0),
+    "temperature-bias": Form("temperature-bias", "curve", "temperature", (WARM,), sizes=(1e-3, 0.0),
                              kept=(7, 0)),
     "output": Form("output", "curve", "output", (Spline(1.0, 4.0, 10),), sizes=(2e-4,), shared=True),
     "column:supply_v": Form("column:supply_v", "curve", "column:supply_v", (Spline(4.8, 5.2, 4),), sizes=(1e-3, 1e-3)),

@@ -248,10 +248,13 @@ def _temperature_hysteresis(columns: Columns, a: Array) -> Array:
     return linear(a) + np.array([0.002, -0.001])[:, None] * lag
 
 
-@made("quantisation", step=0.02, offset=0.005, noise=0.004)
+@made(
+    "quantisation",
+    step__x=0.02, step__y=0.02, offset__x=0.005, offset__y=-0.003, noise__x=0.004, noise__y=0.004,
+)  # fmt: skip
 def _quantisation(columns: Columns, a: Array) -> Array:
-    """The mean of codes, each as likely as normal noise makes it."""
-    codes = 0.005 + 0.02 * np.arange(-20, 260)[:, None, None]
+    """The mean of codes, each as likely as normal noise makes it; behind the converter each axis has its own offset."""
+    codes = np.array([0.005, -0.003])[:, None] + 0.02 * np.arange(-20, 260)[:, None, None]
     reached = norm.cdf((codes + 0.01 - linear(a)) / 0.004) - norm.cdf((codes - 0.01 - linear(a)) / 0.004)
     return np.asarray(np.sum(codes * reached, axis=0))
 

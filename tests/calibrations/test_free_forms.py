@@ -341,8 +341,8 @@ def test_the_saw_of_a_quantiser_tells_its_step_offset_and_noise() -> None:
     step, offset, noise = 4e-3, 0.7e-3, 0.6e-3
     v = np.linspace(0.0, 1.0, 20000, endpoint=False)
     quantiser = catalogue()["quantisation"]
-    p = SimpleNamespace(step=step, offset=offset, noise=noise)
-    saw = quantiser.output(v, poses(np.zeros((len(forces_of_sweep()), 2))), p) - v
+    p = SimpleNamespace(step=np.array([step]), offset=np.array([offset]), noise=np.array([noise]))
+    saw = quantiser.output(v[:, None], poses(np.zeros((len(forces_of_sweep()), 2))), p)[:, 0] - v
     turned = 2 * np.pi * v / step
     sine, cosine = (float(2 * np.mean(saw * wave(turned))) for wave in (np.sin, np.cos))
     found = {name: value for name, _, value in _steps(1 / step, sine, cosine)}

@@ -24,7 +24,7 @@ FILES = sorted((ROOT / "tests" / "data" / "models").glob("*.yaml"))
 
 
 def test_there_is_a_file_of_each_format() -> None:
-    assert [file.stem for file in FILES] == ["common-reach", "covered", "expressions", "first"]
+    assert [file.stem for file in FILES] == ["common-reach", "common-steps", "covered", "expressions", "first"]
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
@@ -53,6 +53,12 @@ def test_a_value_of_all_axes_becomes_that_of_each_axis() -> None:
     assert model.correlations is not None
     keys = ["hysteresis.reach.x", "hysteresis.reach.y", "hysteresis.height.x"]
     assert model.correlations.submatrix(keys).tolist() == [[1, 1, 0.5], [1, 1, 0.5], [0.5, 0.5, 1]]
+
+
+def test_values_of_all_axes_alone_tie_the_effect() -> None:
+    model = read_model(ROOT / "tests" / "data" / "models" / "common-steps.yaml")
+    assert model["quantisation.step"].value == 0.004
+    assert [term.name for term in model.terms if term.tied] == ["quantisation"]
 
 
 def test_a_value_of_all_axes_needs_the_axes_of_another_parameter(golden) -> None:

@@ -31,6 +31,7 @@ CURVES: dict[str, Array] = {
     "own-response": 1e-3 * np.sin(4 * FORCES[:, :2]),
     "cross-response": 1e-3 * np.cos(4 * FORCES[:, [1, 0]]),
     "temperature-bias": 1e-3 * np.tanh((WARMING - 28) / 3)[:, None] * [1.0, -0.5],
+    "temperature-axes": 1e-3 * ((WARMING - 28) / 8)[:, None] * (FORCES[:, [1, 0]] + [0.5, -0.8] * FORCES[:, [2, 2]]),
     "tilt-over-time": 1e-3 * np.linspace(-1, 1, len(FORCES))[:, None] ** 3 * TILTED,
     "beta-bias": 1e-3 * np.cos(HEADINGS)[:, None] * [1.0, -0.4],
     "time-bias": 1e-3 * np.exp(-np.linspace(0, 5, len(FORCES)))[:, None] * [1.0, 2.0],
@@ -48,7 +49,10 @@ def with_form(place: str, data: Table) -> Fit:
 
 
 def changing(place: str) -> dict[str, Array]:
-    return {"temperature-bias": {"temperature_c": WARMING}, "column:humidity": {"humidity": WARMING}}.get(place, {})
+    warming = {"temperature_c": WARMING}
+    return {
+        "temperature-bias": warming, "temperature-axes": warming, "column:humidity": {"humidity": WARMING},
+    }.get(place, {})  # fmt: skip
 
 
 @pytest.mark.parametrize("place", CURVES)

@@ -53,9 +53,9 @@ def test_stairs_are_found_at_their_height_and_place(step: float, noise: float) -
     measured = table(values, step, noise)
     found = find_stairs(measured, values, white(values, noise))
     assert found is not None
-    assert found.step == pytest.approx(step, rel=1e-3)
+    np.testing.assert_allclose(found.step, step, rtol=1e-3)
     sharp = fit_stairs(measured, values, white(values, noise), found)
-    assert abs(sharp.offset / step - np.round(sharp.offset / step)) < 0.05
+    assert np.all(np.abs(sharp.offset / step - np.round(sharp.offset / step)) < 0.05)
 
 
 def test_the_noise_of_samples_that_mostly_are_one_code_is_that_of_the_means() -> None:
@@ -79,7 +79,37 @@ def test_means_that_were_logged_with_few_digits_are_stairs(step: float) -> None:
     found = find_stairs(few_digits(before(), step, 0.004), before(), white(before(), 0.004))
     assert found is not None
     assert found.of_means
-    assert found.step == pytest.approx(step, rel=1e-4)
+    np.testing.assert_allclose(found.step, step, rtol=1e-4)
+
+
+@pytest.mark.parametrize(("steps", "offsets"), [((0.004, 0.004), (0.0, 0.0015)), ((0.004, 0.006), (0.001, 0.002))])
+def test_each_output_has_stairs_of_its_own_where_means_were_rounded(
+    steps: tuple[float, float], offsets: tuple[float, float]
+) -> None:
+    measured = table(before(), 0.0, 0.004)
+    rounded = {
+        name: offset + step * np.round((measured.column(name) - offset) / step)
+        for name, step, offset in zip(("vx_v", "vy_v"), steps, offsets, strict=True)
+    }
+    logged = replace(measured, columns={**measured.columns, **rounded})
+    found = find_stairs(logged, before(), white(before(), 0.004))
+    assert found is not None
+    np.testing.assert_allclose(found.step.ravel(), steps, rtol=1e-4)
+    fraction = (found.offset.ravel() - offsets) / steps
+    np.testing.assert_allclose(fraction, np.round(fraction), atol=1e-3)
+
+
+def test_each_output_has_an_offset_of_its_own_where_samples_were_rounded() -> None:
+    step, noise, shift = 0.008, 0.0008, np.array([[0.0], [0.003]])  # of the codes
+    values = before()
+    measured = table(values - shift, step, noise)
+    shifted = measured.with_outputs(measured.outputs + shift.T)
+    found = find_stairs(shifted, values, white(values, noise))
+    assert found is not None
+    sharp = fit_stairs(shifted, values, white(values, noise), found)
+    np.testing.assert_allclose(sharp.step, step, rtol=1e-3)
+    fraction = (sharp.offset - shift) / step
+    np.testing.assert_allclose(fraction, np.round(fraction), atol=0.05)
 
 
 def test_the_digits_of_a_file_are_no_stairs_where_noise_is_larger() -> None:
@@ -87,7 +117,7 @@ def test_the_digits_of_a_file_are_no_stairs_where_noise_is_larger() -> None:
 
 
 def test_the_noise_of_rounded_means_is_that_of_draws() -> None:
-    stairs = Stairs(0.01, 0.003, 0.001, of_means=True)
+    stairs = Stairs(np.full((1, 1), 0.01), np.full((1, 1), 0.003), 0.001, of_means=True)
     values = 0.003 + 0.01 * np.linspace(-0.5, 0.5, 11)[None]
     draws = values[..., None] + 0.001 * NORMAL
     drawn = np.std(stairs.offset + stairs.step * np.round((draws - stairs.offset) / stairs.step), axis=2)

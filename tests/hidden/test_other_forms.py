@@ -52,6 +52,36 @@ def sagging(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Arra
     return v + tilt[:, None] * np.column_stack([np.sin(heading), -np.cos(heading)])
 
 
+def leaning(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
+    """A sensor whose case leans on its adhesive as it warms up, by 0.1 deg."""
+    lean = np.radians(0.1) * heated(poses) * np.array([0.6, 0.8])
+    return v + lean * np.cos(np.radians(poses.alpha_deg))[:, None]
+
+
+def relaxing(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
+    """A stress that relaxes in twelve small steps of one sign."""
+    share = poses.t_s / poses.t_s.max()
+    at, height = random.uniform(0.02, 0.98, 12), random.lognormal(0.0, 0.6, 12)
+    fallen = (1 + np.tanh((share[:, None] - at) / 0.02)) / 2 @ height / height.sum()
+    return v + 4 * VOLTS * np.outer(fallen, [1.0, 1.2])
+
+
+def ageing(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
+    """A bias that ages with the logarithm of the time, and has not settled at the end."""
+    return v + 5 * VOLTS * np.outer(np.log1p(poses.t_s / (0.8 * poses.t_s.max())), [1.0, -0.6])
+
+
+def softened(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
+    """A suspension that becomes softer towards one face, about a zero of its own at 50 mg."""
+    z = np.cos(np.radians(poses.alpha_deg))[:, None]
+    return v + 4 * VOLTS * (poses.a - 0.05) * z * np.array([1.0, -0.8])
+
+
+def bowed(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
+    """A tether that stretches sideways."""
+    return v + 20 * VOLTS * (np.hypot(1.3, poses.a) - 1.3) * np.array([1.0, 0.7])
+
+
 def hummed(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Array:
     """Mains, as the pace of the poses shows them: a wave in 7.3 poses."""
     phase = 2 * np.pi * poses.t_s[:, None] / (7.3 * sampled.PERIOD_S)
@@ -85,6 +115,7 @@ NAMELESS: dict[sampled.Cause, str] = {
     magnetised: "beta-bias",
     wound: "beta-bias",
     sagging: "tilt-over-time",
+    leaning: "temperature-axes",
 }  # causes that no effect of the catalogue describes, and the places where they act
 
 
@@ -201,6 +232,29 @@ def test_means_whose_digits_are_cut_off_need_one_effect() -> None:
     rounded = replace(sampled.measured(4), constants={})
     cut = rounded.with_outputs(truncated(rounded.outputs))
     assert [step.name for step in discover(cut, read_model("linear")).steps] == ["quantisation"]
+
+
+@pytest.mark.slow
+def test_a_logger_rounds_each_output_about_an_offset_of_its_own() -> None:
+    means = sampled.measured(4, bowed)
+    step_v, offset_v = 0.0012, np.array([0.0002, 0.0009])
+    logged = means.with_outputs(offset_v + step_v * np.round((means.outputs - offset_v) / step_v))
+    found = discover(logged, read_model("linear"))
+    assert set(found.causes) == {"quadratic-nonlinearity", "quantisation"}
+    assert found.steps[-1].held_out_after < 1.3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cause", [relaxing, ageing])
+def test_what_does_not_settle_is_a_drift(cause: sampled.Cause) -> None:
+    found = found_with(cause)
+    named = {name: {name, *found.alternatives.get(name, ())} for name in found.causes}
+    assert [("bias-drift" in names) for names in named.values()] == [True]
+
+
+@pytest.mark.slow
+def test_a_scale_factor_about_a_zero_of_its_own_is_no_misalignment() -> None:
+    assert found_with(softened).causes == ("z-axis-scale",)
 
 
 @pytest.mark.slow

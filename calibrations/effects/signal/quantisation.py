@@ -23,7 +23,8 @@ class Quantisation(Effect):
         V <- o + q (m + sum_j Phi((f - 1/2 - j) q / s) - Phi((-f - 1/2 - j) q / s))     q, o, s in {out}; j = 0, 1, 2
                                                          m: the nearest code's number, f: (V - o) / q - m
 
-    The mean of rounded samples with normal noise of standard deviation s, exactly. The codes are at o + m q.
+    The mean of rounded samples with normal noise of standard deviation s, exactly. The codes are at o + m q. Behind a
+    converter each output has its own offset and gain, so that each axis has its own q, o and s.
 
     Symptom   the residual is a sawtooth over the output, as high as one step.
     Excited by  outputs that differ by many fractions of a step.
@@ -41,17 +42,15 @@ class Quantisation(Effect):
     step = Parameter(
         "{out}",
         typical=1e-6,
-        per_axis=False,
         starts=(1e-3,),
         low=1e-9,
         guess=lambda table: _start(table, 0),
         doc="from one code to the next",
     )
-    offset = Parameter("{out}", typical=1e-4, per_axis=False, guess=lambda table: _start(table, 1), doc="of a code")
+    offset = Parameter("{out}", typical=1e-3, guess=lambda table: _start(table, 1), doc="of a code")
     noise = Parameter(
         "{out}",
-        typical=1e-4,
-        per_axis=False,
+        typical=1e-3,
         low=0.0,
         guess=lambda table: _start(table, 2),
         doc="of a sample, before it is rounded",
@@ -62,8 +61,11 @@ class Quantisation(Effect):
         return len(_frequencies(table)) / FINEST
 
     def output(self, v: Array, table: Table, p: Values) -> Array:
-        noise = max(float(p.noise), LEAST_NOISE * float(p.step))
-        return mean_of_rounded(v, float(p.step), float(p.offset), noise)
+        rounded = v.copy()
+        for k in np.flatnonzero(p.step):  # an axis that is not measured has no step
+            noise = max(float(p.noise[k]), LEAST_NOISE * float(p.step[k]))
+            rounded[:, k] = mean_of_rounded(v[:, k], float(p.step[k]), float(p.offset[k]), noise)
+        return rounded
 
 
 def mean_of_rounded(values: Array, step: float, offset: float, noise: float) -> Array:
@@ -92,25 +94,25 @@ def _frequencies(table: Table) -> Array:
 
 
 def _start(table: Table, k: int) -> Array:
-    return np.full(len(table.axes), _sawtooth(table)[k])
+    return np.broadcast_to(_sawtooth(table)[k], len(table.axes))
 
 
 @lru_cache(maxsize=8)
-def _sawtooth(table: Table) -> tuple[float, float, float]:
-    """(step, offset, noise) of the saw that fits best to the part that is not smooth over the angles."""
+def _sawtooth(table: Table) -> tuple[float, tuple[float, ...], float]:
+    """(step, offset of each axis, noise) of the saw that fits best to the part that is not smooth over the angles."""
     smooth = smooth_columns(table)
     v = table.outputs
     even = smooth @ (smooth.T @ v) if smooth.size else v
-    uneven = (v - even).ravel()
+    uneven = v - even
     frequencies = _frequencies(table)
     if not len(frequencies):
-        return 1e-3, 0.0, 0.0
-    turned = _transform(uneven, even.ravel(), frequencies)
-    best = int(np.argmax(np.abs(turned)))
+        return 1e-3, (0.0,) * len(table.axes), 0.0
+    turned = np.stack([_transform(u, e, frequencies) for u, e in zip(uneven.T, even.T, strict=True)])
+    best = int(np.argmax(np.sum(np.abs(turned) ** 2, axis=0)))
     f = float(frequencies[best])
     # - q / pi sin(2 pi f (V - o)): its transform is + i times a phase of -2 pi f o
-    offset = -np.angle(turned[best] / 1j) / (2 * np.pi * f)
-    return 1 / f, float(offset), float(np.median(table.optional(table.std_names[0], 0.0))) / 2
+    offsets = -np.angle(turned[:, best] / 1j) / (2 * np.pi * f)
+    return 1 / f, tuple(map(float, offsets)), float(np.median(table.optional(table.std_names[0], 0.0))) / 2
 
 
 def _transform(values: Array, positions: Array, frequencies: Array) -> NDArray[np.complex128]:
