@@ -218,7 +218,8 @@ def before_stairs(table: Table, white: Array, stairs: Stairs) -> Table:
     means = [mean_of_rounded(GRID, 1.0, 0.0, max(stairs.noise / step, LEAST_NOISE)) for step in stairs.step.ravel()]
     mean = np.array(means)[:, None, :]
     std = np.maximum(white / stairs.step, 1e-3)
-    weights = np.exp(-0.5 * ((mean - fraction[..., None]) / std[..., None]) ** 2)
+    squares = ((mean - fraction[..., None]) / std[..., None]) ** 2
+    weights = np.exp(-0.5 * (squares - squares.min(axis=2, keepdims=True)))  # where no point is near, the nearest one
     total = weights.sum(axis=2)
     middle = (weights @ GRID) / total
     spread = np.sqrt(np.maximum((weights @ GRID**2) / total - middle**2, 0.0))

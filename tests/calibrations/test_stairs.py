@@ -159,6 +159,15 @@ def test_outputs_before_their_rounding_are_within_their_stated_uncertainty() -> 
     assert np.quantile(std, 0.1) < 0.05 * step
 
 
+def test_an_output_between_two_codes_has_a_finite_value_before_the_rounding() -> None:
+    """Outputs at the limit of an amplifier gather as codes do, and the others lie anywhere between."""
+    measured, noise = table(before(), 0.0, 1e-4), white(before(), 1e-4)
+    stairs = Stairs(np.full((2, 1), 0.05), np.full((2, 1), 2.5), 1e-3)
+    made = before_stairs(measured, noise, stairs)
+    assert np.all(np.isfinite(made.outputs))
+    assert np.all(np.abs(made.outputs - measured.outputs) <= 0.05)
+
+
 @pytest.mark.parametrize("steps", [3.5, 40.0])
 def test_a_saw_of_few_steps_or_of_many_is_proposed(steps: float) -> None:
     """Steps of the converter over the range of the output."""
