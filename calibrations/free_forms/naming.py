@@ -9,7 +9,7 @@ from scipy.special import betaincc  # scipy.stats takes 0.4 s to load
 
 from calibrations.criteria import SIGNIFICANT
 from calibrations.free_forms.components import Component
-from calibrations.free_forms.places_in_time import LONGEST_PART
+from calibrations.free_forms.places_in_time import DRIFT_LINE, LONGEST_PART
 from calibrations.free_forms.search_result import SearchResult
 from calibrations.free_forms.shapes import climb
 from calibrations.table import Array
@@ -21,10 +21,12 @@ NAMED = 0.9  # of a place's variance: the least that the forms must explain toge
 NAMED_ALONE = 0.5  # the same for the only effect of its place that the curve resembles at all: most of the curve
 MOST_FORMS = 2  # forms, at most, that only approximate a curve
 MOST_NAMES = 3  # causes of one curve, at most: four forms, each with a shape of its own, approximate any curve
-DRIFT_LINE = "time-bias/line"
 WARM_UPS = ("warm-up-bias", "warm-up-scale")
 SETTLED = 0.2  # of the record: the longest time constant of what has settled at its end, to less than 1 %
 TWO_MASSES = ((0.04, 0.12), (0.02, 0.06))  # of the record: time constants from which their search starts, and its steps
+FIRST_POSES, OVER_SOON = 0.06, 0.8  # of a record, and of the variance of what decays within them
+TIME_CONSTANTS = tuple(np.geomspace(0.02, 3.0, 40).tolist())  # of the record, that a decay may have
+UNSETTLED = 0.36  # of the record: of a longer time constant, more than a twentieth of the decay is in the last fifth
 JUMPS = 4.0  # excess kurtosis of a walk's increments: 500 of a Gaussian process keep within +-1
 SWINGS = 2  # periods in a record: the least that a swing has, and a drift has not
 FEWEST_WAVES = 8  # that the data determine: of fewer, the largest is large by chance
@@ -56,6 +58,31 @@ def causes_of_place(
         if followed is not None:
             return (followed[0].cause,), followed[1], followed[0].constants
     return causes, share, ()
+
+
+def is_over_soon(curve: Array, elapsed_share: Array) -> bool:
+    """Whether a curve decays within the first poses, as the memory of what came before them does.
+
+    curve           by axis, (channels, n)
+    elapsed_share   time of each row, from 0 to 1 along the record, (n,)
+    """
+    largest = max(curve, key=np.ptp)
+    squares = (largest - np.median(largest)) ** 2
+    return bool(squares[elapsed_share < FIRST_POSES].sum() > OVER_SOON * squares.sum())
+
+
+def is_unsettled(curve: Array, elapsed_share: Array) -> bool:
+    """Whether the decay that a curve resembles most is not over at the end of the record.
+
+    A drift that becomes slower, such as ageing with the logarithm of the time, looks like that too.
+    """
+    largest = max(curve, key=np.ptp)
+    squares = []
+    for part in TIME_CONSTANTS:
+        X = np.column_stack([np.ones_like(elapsed_share), np.exp(-elapsed_share / part)])
+        remaining = largest - X @ np.linalg.lstsq(X, largest, rcond=None)[0]
+        squares.append(float(remaining @ remaining))
+    return bool(TIME_CONSTANTS[int(np.argmin(squares))] > UNSETTLED)
 
 
 def project_off(Q: Array, x: Array) -> Array:

@@ -25,6 +25,7 @@ LONG_LEADS_S = (-300.0, 300.0)  # the same at rest, where an oven warms a whole 
 WAVES, WALK_WAVES = 24, 160  # of slow noise, and of a random walk, whose roughness is never small
 PLAYS = (0.05, 0.15, 0.35)  # of the range of temperatures
 BRANCHES = (0.02, 0.035, 0.06, 0.1, 0.17, 0.28, 0.45)  # the same: plays that together are a hysteresis of any shape
+DRIFT_LINE = "time-bias/line"  # the component of a straight drift
 LEAST_CHANGE_G = 0.1  # of the force out of the plane, which is else a bias
 OF_LEVEL = (("level", 1.0),)  # constant of an effect that the temperature drives without the scatter of its readings
 FEWEST_TIMED, FEWEST_NOISE = 12, 20  # rows that can show a function of time, and slow noise

@@ -16,7 +16,7 @@ from calibrations.free_forms.chain import ModelEffects
 from calibrations.free_forms.descent import CONVERGED, SLOW_MOST, descend, take_damped_step
 from calibrations.free_forms.jumps import STEPS
 from calibrations.free_forms.place_names import HISTORY
-from calibrations.free_forms.places_in_time import slow_noise
+from calibrations.free_forms.places_in_time import DRIFT_LINE, slow_noise
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.reml import coefficients, estimate
 from calibrations.free_forms.search_result import NOISE_ALONE, SearchResult, Setting
@@ -29,7 +29,6 @@ FEW_COMPONENTS = 3  # up to which one start is enough, if they leave noise alone
 # The residual over the noise: a smaller one is explained without flicker; a larger one contains effects that the search
 # did not find.
 LEAST_MISFIT, MOST_MISFIT = 1.2, 2.0
-LINE = "time-bias/line"
 LIKELIER = 8.0  # of -2 log likelihood: flicker so strong is rare
 FLICKER_BEGIN = 0.1  # noise floors: standard deviation from which the estimate of the flicker starts
 ANY = 1e8  # a variance that is no limit
@@ -159,12 +158,14 @@ def _is_flicker(result: SearchResult) -> bool:
         return False
     data, setting = result.data, result.setting
     noise = slow_noise(data, all_frequencies=True)
-    others = [c for c in result.components if not c.noise and (c.name in result.sizes.variances or c.name == LINE)]
+    others = [
+        c for c in result.components if not c.noise and (c.name in result.sizes.variances or c.name == DRIFT_LINE)
+    ]
     scales = {**result.gram.scales, **{component.name: 1.0 for component in noise}}
     g = setting.linearise(replace(result.point, components=[*others, *noise]), scales)[1]
     begin = {component.name: (FLICKER_BEGIN * setting.floor) ** 2 for component in noise}
     acting_variances = {name: v for name, v in result.sizes.variances.items() if name not in begin}
-    drift = {LINE: acting_variances.get(LINE, 1.0)} if LINE in g.blocks else {}
+    drift = {DRIFT_LINE: acting_variances.get(DRIFT_LINE, 1.0)} if DRIFT_LINE in g.blocks else {}
     other_variances: Mapping[str, float] = (
         {n: v for n, v in acting_variances.items() if n not in following} | drift | begin
     )
@@ -175,4 +176,4 @@ def _is_flicker(result: SearchResult) -> bool:
 def _follows_time(result: SearchResult, name: str) -> bool:
     """Whether a component is a bias over time that can have almost any form."""
     component = result.component(name)
-    return component.place == "time-bias" and component.form is not None and name != LINE
+    return component.place == "time-bias" and component.form is not None and name != DRIFT_LINE

@@ -17,13 +17,13 @@ from calibrations.free_forms.bases import StraightLine
 from calibrations.free_forms.chain import Coefficients, ModelEffects
 from calibrations.free_forms.form import CROSS, Form
 from calibrations.free_forms.geometry import LINEAR_PART, Geometry, GeometryEffects, geometry
+from calibrations.free_forms.naming import is_over_soon, is_unsettled
 from calibrations.free_forms.place_names import HISTORY, place_of_effect
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.search import search
 from calibrations.free_forms.search_result import SearchResult
 from calibrations.free_forms.selection import ENTER
 from calibrations.free_forms.stairs import SAW, Stairs
-from calibrations.free_forms.transients import is_over_soon, is_unsettled
 from calibrations.geometry.orientation import out_of_plane
 from calibrations.geometry.smooth import smooth_columns
 from calibrations.means.noise import neighbour_std, neighbours_contradict, robust_std

@@ -222,14 +222,10 @@ class Record:
         values = {"kind": table.kind, "procedure": "import", "state": "complete", "bench": {}}
         values |= {"settings": dict(settings or {})}
         values |= {"configuration": table.digest, "constants": dict(table.constants), "source": table.source}
-        cells: Iterator[dict[str, Any]] = (
-            chain(  # one column at a time: two copies of a large table do not fit into memory
-                (
-                    {"name": name, "numbers": np.asarray(column, "<f8").tobytes()}
-                    for name, column in table.columns.items()
-                ),
-                ({"name": name, "texts": list(column)} for name, column in table.labels.items()),
-            )
+        # one column at a time: two copies of a large table do not fit into memory
+        cells: Iterator[dict[str, Any]] = chain(
+            ({"name": name, "numbers": np.asarray(column, "<f8").tobytes()} for name, column in table.columns.items()),
+            ({"name": name, "texts": list(column)} for name, column in table.labels.items()),
         )
         with self.engine.begin() as connection:
             run = new_run(connection, values | {"ended": timestamp()})

@@ -8,14 +8,16 @@ import numpy as np
 import pytest
 
 from calibrations.free_forms.acting_places import _least_size
-from calibrations.free_forms.naming import _orthonormal, _residual_squares
+from calibrations.free_forms.naming import _orthonormal, _residual_squares, is_over_soon, is_unsettled
 from calibrations.loop import discover
 from calibrations.model.file import read_model
+from calibrations.table import Array
 from tests.calibrations.synthetic import components, poses, turns
 
 COLUMNS = turns((90, 30, 150), step_deg=15.0)
 ROWS = len(COLUMNS["t_s"])
 SHARE = np.arange(ROWS) / ROWS
+RECORD = np.linspace(0.0, 1.0, 300)
 
 
 @pytest.mark.parametrize(("fast", "slow"), [(0.05, 0.2), (0.08, 0.3)])
@@ -61,3 +63,22 @@ def test_a_curve_is_left_by_a_cause_beside_those_that_were_chosen_as_by_all_toge
     assert _residual_squares([tried], curve[:, 0], companions) == pytest.approx(expected, rel=1e-9)
     spanned = _residual_squares([chosen[:, :1]], curve[:, 0], companions)
     assert spanned == pytest.approx(float(np.sum((curve - companions @ (companions.T @ curve)) ** 2)), rel=1e-9)
+
+
+def both(curve: Array) -> Array:
+    """The curve of two axes, the second one smaller and of the other sign."""
+    return np.stack([curve, -0.4 * curve])
+
+
+@pytest.mark.parametrize(("part", "unsettled"), [(0.05, False), (0.3, False), (0.5, True), (2.0, True)])
+def test_a_long_time_constant_is_not_settled(part: float, unsettled: bool) -> None:
+    assert is_unsettled(both(np.exp(-RECORD / part)), RECORD) is unsettled
+
+
+def test_ageing_with_the_logarithm_of_the_time_is_not_settled() -> None:
+    assert is_unsettled(both(np.log1p(RECORD / 0.8)), RECORD)
+
+
+@pytest.mark.parametrize(("part", "soon"), [(0.01, True), (0.2, False)])
+def test_a_short_time_constant_is_over_within_the_first_poses(part: float, soon: bool) -> None:
+    assert is_over_soon(both(np.exp(-RECORD / part)), RECORD) is soon
