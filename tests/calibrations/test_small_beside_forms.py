@@ -72,6 +72,19 @@ def test_an_insignificant_cause_is_left_out_where_a_later_one_describes_its_part
         assert [a.effect.name for a in kept] == names
 
 
+def test_beside_steps_a_cause_stays_while_the_curve_of_its_place_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    added = [addition("quadratic-nonlinearity"), addition("quantisation"), Addition(free_form((CURVE,)))]
+    fits = [SimpleNamespace(pooled_excess=e, held_out_excess=e) for e in (9.0, 3.0, 2.0, 1.0)]
+
+    def together(base: object, additions: list[Addition]) -> SimpleNamespace:
+        error = 1.0 if added[2] in additions else 2.0  # the curve describes the quadratic nonlinearity as well
+        return SimpleNamespace(pooled_excess=error, held_out_excess=error)
+
+    monkeypatch.setattr(structural, "fit_together", together)
+    monkeypatch.setattr(structural, "fit_successively", lambda base, end, additions: [end for _ in additions])
+    assert structural._without_idle_additions(added, fits, [], [])[0] == added
+
+
 def test_a_cause_whose_values_are_noise_in_the_fitted_model_is_not_significant() -> None:
     columns = synthetic.turns((90, 30, 150))
     a = np.column_stack(synthetic.components(columns))[:, :2]
