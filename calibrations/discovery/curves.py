@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrations.discovery.findings import Findings
-from calibrations.fitting.fit import Fit
+from calibrations.fitting.fit import Fit, scales
 from calibrations.fitting.identifiability import covariance
-from calibrations.free_forms.effect import FreeForm
-from calibrations.free_forms.form import CROSS, TILT
+from calibrations.free_forms.effect import FreeForm, parameter_names
+from calibrations.free_forms.form import CROSS, OUT_OF_PLANE, TILT, TURNING_AXES, Form
 from calibrations.free_forms.place_names import PREFIX, place_of_effect
 from calibrations.geometry.orientation import out_of_plane
 from calibrations.model.chain import forward, respond, static_force
-from calibrations.table import Array, Table
+from calibrations.table import AXES, Array, Table
 
 MOST_POINTS = 48  # of a curve
 MOST_SAMPLES = 4000  # of a record along which a curve is drawn
@@ -49,13 +49,15 @@ DRIVERS = {  # place -> driver, its unit, factor of the curve
     "time-scale": ("t_s", "s", "force"),
     "output": ("output", "{out}", ""),
 }  # and a logged column
+TURNS = {TILT: ("t_s", "s"), TURNING_AXES: ("temperature_c", "degC")}  # place -> driver of its angles, its unit
 
 
 @dataclass(frozen=True)
 class PlaceCurve:
     """The curve of a place. `value` and `std` by axis, shape (m,), over `at` by axis, (m,), in `unit`.
 
-    Stage angles have one curve for all axes, under the name of the angle; turns of the base have one about each axis.
+    Stage angles have one curve for all axes, under the name of the angle; turns of the base have one about each axis,
+    and turns of the sensing axes one from each axis towards each other one.
     `explained` has the part of the effects of the catalogue alone.
     """
 
@@ -82,7 +84,7 @@ class PlaceCurve:
     @cached_property
     def expression(self) -> str | None:
         """An expression that describes the largest curve and can be added; None where none does."""
-        if self.place == TILT:  # no expression turns the base
+        if self.place in TURNS:  # no expression turns the base or an axis
             return None
         axis = self.largest
         return _propose_expression(self, axis, self.at[axis], self.value[axis], self.std[axis])
@@ -97,8 +99,8 @@ def place_curves(findings: Findings[Fit]) -> dict[str, PlaceCurve]:
 
 def place_curve(end: Fit, place: str) -> PlaceCurve | None:
     """The curve of a place in a fitted model; None without an effect there, or without a single driver."""
-    if place == TILT:
-        return _turns_over_time(end)
+    if place in TURNS:
+        return _turns(end, place)
     names = [term.name for term in end.model.terms if place_of_effect(term.name) == place]
     place_driver = DRIVERS.get(place) or _find_logged_column(place, end.problem.samples)
     if not names or place_driver is None:
@@ -165,24 +167,36 @@ class CurveRows:
         return np.stack(changes, axis=2)
 
 
-def _turns_over_time(end: Fit) -> PlaceCurve | None:
-    """The turn about each axis of a base that turns slowly, from its mean; None without it."""
-    effect = next((term.effect for term in end.model.terms if term.name == f"{PREFIX}{TILT}"), None)
+def _turns(end: Fit, place: str) -> PlaceCurve | None:
+    """Turns from their mean: of the base about each axis, or of each sensing axis towards the others; None without."""
+    terms = end.model.terms
+    at = next((i for i, term in enumerate(terms) if term.name == f"{PREFIX}{place}"), None)
+    effect = None if at is None else terms[at].effect
     if not isinstance(effect, FreeForm):
         return None
-    mask = end.problem.layout.of_effect(effect.name)
-    theta, cov = end.theta[mask], covariance(end.information, end.problem.layout.typical)[0][np.ix_(mask, mask)]
-    t = np.linspace(end.table.time_s.min(), end.table.time_s.max(), MOST_POINTS)
-    values, bands, start = {}, {}, 0
+    cov, slots = covariance(end.information, end.problem.layout.typical)[0], end.problem.layout.slots
+    driver, driver_unit = TURNS[place]
+    column = end.table.time_s if driver == "t_s" else end.table.column(driver)
+    x = np.linspace(column.min(), column.max(), MOST_POINTS)
+    values, bands = {}, {}
     for form in effect.forms:
-        columns = form.columns_at(t, 0)
-        columns = columns - columns.mean(axis=0)
-        of_form = slice(start, start + form.count(0))
-        start = of_form.stop
-        values[form.name] = np.degrees(columns @ theta[of_form])
-        bands[form.name] = np.degrees(np.sqrt(np.sum((columns @ cov[of_form, of_form]) * columns, axis=1)))
-    none = {name: np.zeros(len(t)) for name in values}
-    return PlaceCurve(TILT, "t_s", "s", "deg", dict.fromkeys(values, t), values, bands, none)
+        for k, axis in enumerate(("",) if form.shared else end.table.axes):
+            names = parameter_names(form, k)
+            mask = np.array([s.term == at and s.axis == axis and s.parameter.name in names for s in slots])
+            if not mask.any():
+                continue
+            columns = form.columns_at(x, k)
+            columns = np.degrees(columns - columns.mean(axis=0)) / (1.0 if form.shared else scales(end)[k])
+            name = _turn_name(form, k)
+            values[name] = columns @ end.theta[mask]
+            bands[name] = np.sqrt(np.sum((columns @ cov[np.ix_(mask, mask)]) * columns, axis=1))
+    none = {name: np.zeros(len(x)) for name in values}
+    return PlaceCurve(place, driver, driver_unit, "deg", dict.fromkeys(values, x), values, bands, none)
+
+
+def _turn_name(form: Form, k: int) -> str:
+    """Such as "about-x" of the base, or "x to z" of a sensing axis."""
+    return form.name if form.shared else f"{AXES[k]} to {AXES[(CROSS if form.factor == 'cross' else OUT_OF_PLANE)[k]]}"
 
 
 def _find_logged_column(place: str, table: Table) -> tuple[str, str, str] | None:

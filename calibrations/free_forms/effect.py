@@ -118,7 +118,7 @@ class FreeForm(Effect):
     def _coefficients(self, p: Values, k: int) -> Array:
         """Coefficients of all forms for axis k."""
         if k not in self._names:
-            self._names[k] = [(_name(form, j), form.shared) for form in self.forms for j in range(form.count(k))]
+            self._names[k] = [(name, form.shared) for form in self.forms for name in parameter_names(form, k)]
         return np.array([float(p[name] if shared else p[name][k]) for name, shared in self._names[k]])
 
     def _columns(self, table: Table, force: Array, k: int) -> Array:
@@ -162,7 +162,7 @@ class FreeForm(Effect):
         """Columns (n, count) of each axis by the name of their parameter, (n, 3)."""
         by_name = {p.name: np.zeros((len(columns_by_axis[0]), 3)) for p in self.parameters}
         for k, columns in enumerate(columns_by_axis):
-            names = [_name(form, j) for form in self.forms for j in range(form.count(k))]
+            names = [name for form in self.forms for name in parameter_names(form, k)]
             for name, column in zip(names, columns.T, strict=True):
                 by_name[name][:, k] = column
         return by_name
@@ -226,6 +226,11 @@ def coefficients_of(form: Form, p: Values, k: int) -> Array:
     """Coefficients of one form for axis k, shape (count,)."""
     values = [p[_name(form, j)] for j in range(form.count(k))]
     return np.array([float(v if form.shared else v[k]) for v in values])
+
+
+def parameter_names(form: Form, k: int) -> list[str]:
+    """The name of the coefficient of each column of axis k."""
+    return [_name(form, j) for j in range(form.count(k))]
 
 
 def _name(form: Form, j: int) -> str:

@@ -42,6 +42,7 @@ CROSS = (1, 0, 0)  # of x, y, z: the other axis in the plane
 OUT_OF_PLANE = (2, 2, 1)  # the same: the axis out of the plane
 ANGLES = ("alpha", "beta")
 TILT = "tilt-over-time"  # the place of a base that turns slowly, and of a sensor that turns on its stage
+TURNING_AXES = "temperature-axes"  # the place of sensing axes that turn in their case
 TURNED = {"about-x": "tilt", "about-y": "alpha", "about-z": "beta"}  # the angle that each of its forms changes
 OF_FORCE = ("own", "cross", "out-of-plane", "force", "way")  # drivers of what the sensor makes of the force
 MODELLED = ("own", "cross", "out-of-plane", "output")  # drivers that the parameters of a model change

@@ -12,7 +12,7 @@ from calibrations.effects.logged import leading_temperature, reading_error
 from calibrations.free_forms.bases import Play, Settling, StraightLine, Waves, spline
 from calibrations.free_forms.chain import State
 from calibrations.free_forms.components import GENERAL, PRODUCT, Columns, Component, Make, Starts, free, per_axis
-from calibrations.free_forms.form import Factor, Form
+from calibrations.free_forms.form import TURNING_AXES, Factor, Form
 from calibrations.free_forms.poses import PoseData
 from calibrations.table import Array
 
@@ -105,7 +105,7 @@ def _axes_over_temperature(data: PoseData, first: State) -> list[Component]:
     has_inclinations = np.ptp(first.force[:, 2]) > LEAST_CHANGE_G
     factors: tuple[Factor, ...] = ("cross", "out-of-plane") if has_inclinations else ("cross",)
     return [
-        free(Form("temperature-axes", factor, "temperature", smooth, factor), first, price=GENERAL, general=True)
+        free(Form(TURNING_AXES, factor, "temperature", smooth, factor), first, price=GENERAL, general=True)
         for factor in factors
     ]
 

@@ -14,7 +14,7 @@ from calibrations.effects import Effect
 from calibrations.effects.catalogue import find
 from calibrations.errors import nearest
 from calibrations.free_forms.effect import FreeForm, place_of
-from calibrations.free_forms.form import ANGLES, TILT
+from calibrations.free_forms.form import ANGLES, TILT, TURNING_AXES
 from calibrations.free_forms.place_names import PLACES, PREFIX
 from calibrations.geometry.stage_path import last_turn, with_approach
 from calibrations.table import Table
@@ -171,7 +171,7 @@ def _formula(place: str) -> str:
         return f"{angle} <- {angle} + f({angle})"
     if place == TILT:
         return "the base turns about x, y, z by f_x(t), f_y(t), f_z(t)"
-    if place == "temperature-axes":
+    if place == TURNING_AXES:
         return "V += a_j f_i(T) + a_z g_i(T)"
     x = {"own-response": "a_i", "cross-response": "a_j", "z-response": "a_z", "output": "V", "force": "a"}
     factor = "a_i " if place.startswith("scale-over") or place.endswith("-scale") else ""

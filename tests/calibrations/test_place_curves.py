@@ -12,6 +12,7 @@ from calibrations.discovery.rows import Rows
 from calibrations.discovery.summary import certainty_text, step_shares, summary_lines
 from calibrations.effects.catalogue import catalogue
 from calibrations.effects.expression import parse
+from calibrations.fitting.fit import scales
 from calibrations.free_forms.requested import resolve_effect
 from calibrations.loop import discover
 from calibrations.model.file import read_model
@@ -88,6 +89,20 @@ def test_a_slow_turn_of_the_base_has_a_curve_in_degrees_for_each_axis() -> None:
     assert np.std(curve.value["about-x"] - tilt) < 0.03 * np.ptp(tilt)
     assert np.mean(curve.std["about-x"]) < 0.03 * np.ptp(tilt)
     assert curve_panel(curve, "about-x").x.label == "time, s"
+
+
+def test_sensing_axes_that_turn_have_a_curve_in_degrees_from_each_axis_to_the_others() -> None:
+    warming = {"temperature_c": WARMING}
+    found = with_form("temperature-axes", table(CURVES["temperature-axes"], **warming))
+    curve = place_curve(found, "temperature-axes")
+    assert curve is not None
+    assert (curve.unit, curve.driver, curve.expression) == ("deg", "temperature_c", None)
+    line = np.degrees(1e-3 * (curve.at["x to y"] - np.mean(curve.at["x to y"])) / 8)
+    for name, part in {"x to y": 1.0, "x to z": 0.5, "y to x": 1.0, "y to z": -0.8}.items():
+        true = part * line / scales(found)["xy".index(name[0])]
+        assert np.all(np.abs(curve.value[name] - true) < 3 * curve.std[name])
+        assert curve.std[name][-1] < 0.12 * abs(true[-1])  # on the first, cold poses no force is out of the plane
+    assert curve_panel(curve, "x to z").x.label == "temperature, degC"
 
 
 def test_a_place_without_an_effect_or_without_one_driver_has_no_curve() -> None:
