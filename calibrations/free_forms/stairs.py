@@ -27,6 +27,7 @@ POINTS = 4.0  # in a resolved interval of frequency
 MOST_FREQUENCIES = 20_000  # frequencies
 GATHERED = 0.28  # more than the linear model's outputs gather at the same codes: |mean of exp(2 pi i V / step)|
 BY_CHANCE = 3.0  # times the most that outputs at random gather: sqrt(log(frequencies) / outputs)
+AT_END = 3.0  # noises of a mean from a least or greatest output: within, it may lie at a limit of the sensor
 SAME_CODE = 1e-9  # of the range: a smaller difference is one of rounded numbers
 VISIBLE_ROUNDING = 1.0  # noise of a mean, in a step from which its rounding error is not small beside the noise
 REACHED = 3  # codes to either side of the nearest one, that noise may reach
@@ -72,9 +73,11 @@ def find_stairs(table: Table, linear: Array, white: Array) -> Stairs | None:
 
     white   of each mean, (channels, n)
 
-    A sweep's own regular angles gather outputs as well: the linear model has the same angles and no stairs.
+    A sweep's own regular angles gather outputs as well: the linear model has the same angles and no stairs. Outputs at a
+    limit of the sensor gather there, and not at codes: those at either end of the outputs do not count.
     """
-    rounded_means = _stairs_of_means(table.outputs.T, float(np.sqrt(np.mean(white**2))))
+    noise_of_mean = float(np.sqrt(np.mean(white**2)))
+    rounded_means = _stairs_of_means(table.outputs.T, noise_of_mean)
     if rounded_means is not None:
         return rounded_means
     noise = float(np.median(table.optional(table.std_names[0], 0.0)))
@@ -83,16 +86,22 @@ def find_stairs(table: Table, linear: Array, white: Array) -> Stairs | None:
     f = np.arange(FEWEST_STEPS / span, highest, 1 / (POINTS * span))
     if not len(f):
         return None
-    excess = _measure_concentration(channels, f) - _measure_concentration(linear, f)
+    width = AT_END * noise_of_mean
+    inner = [(values > values.min() + width) & (values < values.max() - width) for values in channels]
+    within = [values[kept] for values, kept in zip(channels, inner, strict=True)]
+    of_linear = [values[kept] for values, kept in zip(linear, inner, strict=True)]
+    if min(map(len, within)) == 0:
+        return None
+    poses = np.unique(np.round(linear[:, np.any(inner, axis=0)] / span, 6), axis=1).shape[1]  # and not visits
+    excess = _measure_concentration(within, f) - _measure_concentration(of_linear, f)
     best = int(np.argmax(excess))
-    different = len(channels) * len(np.unique(np.round(linear / span, 6), axis=1).T)  # poses, not visits
-    by_chance, by_few_poses = (BY_CHANCE * float(np.sqrt(np.log(len(f)) / k)) for k in (channels.size, different))
+    counts = sum(map(len, within)), len(channels) * poses
+    by_chance, by_few_poses = (BY_CHANCE * float(np.sqrt(np.log(len(f)) / count)) for count in counts)
     if excess[best] < max(GATHERED, by_chance) or by_few_poses >= 1.0:  # few poses gather anywhere
         return None
     fine = f[best] + np.linspace(-1, 1, 81) / (POINTS * span)
-    frequency = float(fine[int(np.argmax(_measure_concentration(channels, fine)))])
-    width = 3 * float(np.sqrt(np.mean(white**2)))
-    found = [_stairs_of_channel(values, frequency, width) for values in channels]
+    frequency = float(fine[int(np.argmax(_measure_concentration(within, fine)))])
+    found = [_stairs_of_channel(values, frequency, width) for values in within]
     step, offset = np.array(found).T[:, :, None]
     return Stairs(step, offset, noise or _sample_noise(channels, white, step, offset))
 
@@ -192,8 +201,8 @@ def _sharpen_step(values: Array, step: float, offset: float, middle: float, widt
     return best[1], best[2]
 
 
-def _measure_concentration(channels: Array, frequencies: Array) -> Array:
-    """|mean of exp(2 pi i f V)| of each of the `channels` (channels, n), rms, at equally spaced frequencies.
+def _measure_concentration(channels: Sequence[Array], frequencies: Array) -> Array:
+    """|mean of exp(2 pi i f V)| of each of the `channels`, rms, at equally spaced frequencies.
 
     Each frequency is the sum of a coarse and a fine one, so that few exponentials and a product of matrices give all.
     """

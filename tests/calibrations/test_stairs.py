@@ -146,6 +146,16 @@ def test_a_converter_without_stairs_is_no_quantiser_though_a_regular_sweep_gathe
     assert found.causes == ("scale-factor-asymmetry",)
 
 
+@pytest.mark.parametrize("limit", [0.9, 0.6])
+def test_outputs_at_a_limit_of_the_sensor_are_no_stairs(limit: float) -> None:
+    values = before() + np.random.default_rng(1).uniform(-0.02, 0.02, before().shape)  # a regular sweep is no sample
+    limited = np.clip(values, 2.5 - limit, 2.5 + limit)
+    assert find_stairs(table(limited, 0.0, 0.0008), values, white(values, 0.0008)) is None
+    stairs = find_stairs(table(limited, 0.008, 0.0008), values, white(values, 0.0008))
+    assert stairs is not None
+    np.testing.assert_allclose(stairs.step, 0.008, rtol=1e-3)
+
+
 def test_outputs_before_their_rounding_are_within_their_stated_uncertainty() -> None:
     values, step, noise = before(), 0.008, 0.0008
     measured = table(values, step, noise)
