@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
+from scipy.special import chdtri, ndtr  # scipy.stats takes 0.4 s to load
 
 from calibrations.effects.signal.quantisation import mean_of_rounded
 from calibrations.free_forms.chain import State
-from calibrations.free_forms.components import Component, Starts
+from calibrations.free_forms.components import Component, Starts, per_axis
 from calibrations.free_forms.poses import PoseData
 from calibrations.means.noise import with_white
 from calibrations.table import Array, Table
@@ -73,8 +73,8 @@ def find_stairs(table: Table, linear: Array, white: Array) -> Stairs | None:
 
     white   of each mean, (channels, n)
 
-    A sweep's own regular angles gather outputs as well: the linear model has the same angles and no stairs. Outputs at a
-    limit of the sensor gather there, and not at codes: those at either end of the outputs do not count.
+    A sweep's own regular angles gather outputs as well: the linear model has the same angles and no stairs. Outputs
+    at a limit of the sensor gather there, and not at codes: those at either end of the outputs do not count.
     """
     noise_of_mean = float(np.sqrt(np.mean(white**2)))
     rounded_means = _stairs_of_means(table.outputs.T, noise_of_mean)
@@ -287,23 +287,29 @@ def find_saw(
     frequencies = step * np.arange(int(np.ceil(3 / span / step)), int(highest / step))
     if not len(frequencies):
         return None
-    response = state.response.ravel()
-    values = (residual / white**2).ravel()
-    weights = (1 / white**2).ravel()
-    power = _spectrum(response, values, step, int(highest / step))[-len(frequencies) :] * 2 / np.sum(weights)
-    amplitude = np.sqrt(2 * power / np.sum(weights))
+    count = int(highest / step)
+    weights = 1 / white**2
+    channels = list(zip(state.response, residual * weights, weights, strict=True))
+    powers = np.stack([_spectrum(v, r, step, count)[-len(frequencies) :] * 2 / w.sum() for v, r, w in channels])
+    amplitude = np.sqrt(np.mean(2 * powers / weights.sum(axis=1, keepdims=True), axis=0))
+    power = powers.sum(axis=0)
     power[amplitude < LEAST_OF_SAW * _fundamental(frequencies, noise)] = 0.0  # no saw: a step has a height
     for f in rejected:
         close = np.abs(frequencies - f) * span < 1.0
         if sum(abs(earlier - f) * span < 1.0 for earlier in rejected) > SAW_REJECTIONS:
             power[close] = 0.0
     best = int(np.argmax(power))
-    price = 2 * np.log(len(frequencies) / SAW_POINTS)
+    price = _threshold(2 * np.log(len(frequencies) / SAW_POINTS) + enter, len(channels)) - enter
     if power[best] < price + enter:
         return None
     fine = frequencies[best] + np.linspace(-1, 1, 41) / (SAW_POINTS * span)
-    power = np.abs(np.exp(-2j * np.pi * np.outer(fine, response)) @ values) ** 2
-    return sawtooth(float(fine[int(np.argmax(power))]), 3, price, 0.05 / span)
+    power = np.sum([np.abs(np.exp(-2j * np.pi * np.outer(fine, v)) @ r) ** 2 / w.sum() for v, r, w in channels], axis=0)
+    return sawtooth(float(fine[int(np.argmax(power))]), 3, price, 0.05 / span, data.table.axes)
+
+
+def _threshold(gain: float, channels: int) -> float:
+    """Of a wave's gain summed over channels, each with a phase of its own: as rare as `gain` of one wave is."""
+    return float(chdtri(2 * channels, np.exp(-gain / 2)))
 
 
 def _fundamental(frequencies: NDArray[np.floating], noise: float) -> Array:
@@ -322,25 +328,36 @@ def _spectrum(positions: Array, values: Array, step: float, count: int) -> Array
     return np.asarray(np.abs(np.fft.rfft(grid)[:count]) ** 2)
 
 
-def sawtooth(frequency: float, harmonics: int, price: float, step: float) -> Component:
-    """Quantisation: harmonics of a saw over the output, codes per unit of output; `step` of the frequency to try."""
+def sawtooth(frequency: float, harmonics: int, price: float, step: float, axes: Sequence[str]) -> Component:
+    """Quantisation: harmonics of a saw over each output, codes per unit of output; `step` of the frequency to try.
+
+    Behind a converter each output has an offset of its own, and so has each saw its phase.
+    """
     name = f"output/quantisation@{frequency:.6g}"
 
     def at(shape: tuple[float, ...]) -> Component:
-        def columns(s: State) -> Array:
-            turned = 2 * np.pi * shape[0] * s.response[:, :, None] * np.arange(1, harmonics + 1)
+        def waves(s: State, k: int) -> Array:
+            turned = 2 * np.pi * shape[0] * s.response[k, :, None] * np.arange(1, harmonics + 1)
             scale = 1.0 / np.arange(1, harmonics + 1)
-            return np.concatenate([np.sin(turned) * scale, np.cos(turned) * scale], axis=2)
+            return np.concatenate([np.sin(turned) * scale, np.cos(turned) * scale], axis=1)
+
+        def starts(x: Array) -> Starts:
+            first = x.reshape(len(axes), 2, harmonics)[:, :, 0]
+            return tuple(
+                (parameter, axis, value)
+                for axis, (sine, cosine) in zip(axes, first, strict=True)
+                for parameter, value in _steps(shape[0], float(sine), float(cosine))
+            )
 
         return Component(
-            name, "output", "output", "quantisation", "output/quantisation", price, columns,
-            shape=shape, step=(step,), reshaped=at, starts=lambda x: _steps(shape[0], x[0], x[harmonics]),
+            name, "output", "output", "quantisation", "output/quantisation", price, per_axis(waves),
+            shape=shape, step=(step,), reshaped=at, starts=starts,
         )  # fmt: skip
 
     return at((frequency,))
 
 
-def _steps(frequency: float, sine: float, cosine: float) -> Starts:
+def _steps(frequency: float, sine: float, cosine: float) -> tuple[tuple[str, float], ...]:
     """Step, offset and noise of the quantiser whose saw has this first harmonic.
 
     The saw of rounding is -(q / pi) exp(-2 (pi s / q)^2) sin(2 pi (V - o) / q) and harmonics (Widrow and Kollar, 2008).
@@ -349,4 +366,4 @@ def _steps(frequency: float, sine: float, cosine: float) -> Starts:
     fraction = np.clip(np.pi * np.hypot(sine, cosine) / step, 1e-6, 1.0)
     noise = step / np.pi * np.sqrt(-np.log(fraction) / 2)
     offset = step / (2 * np.pi) * np.arctan2(cosine, -sine)
-    return ("step", "", step), ("offset", "", float(offset)), ("noise", "", float(noise))
+    return ("step", step), ("offset", float(offset)), ("noise", float(noise))

@@ -345,7 +345,7 @@ def test_the_saw_of_a_quantiser_tells_its_step_offset_and_noise() -> None:
     saw = quantiser.output(v[:, None], poses(np.zeros((len(forces_of_sweep()), 2))), p)[:, 0] - v
     turned = 2 * np.pi * v / step
     sine, cosine = (float(2 * np.mean(saw * wave(turned))) for wave in (np.sin, np.cos))
-    found = {name: value for name, _, value in _steps(1 / step, sine, cosine)}
+    found = dict(_steps(1 / step, sine, cosine))
     assert found == pytest.approx({"step": step, "offset": offset, "noise": noise}, rel=1e-2)
 
 

@@ -182,7 +182,7 @@ def test_an_output_between_two_codes_has_a_finite_value_before_the_rounding() ->
 def test_a_saw_of_few_steps_or_of_many_is_proposed(steps: float) -> None:
     """Steps of the converter over the range of the output."""
     output = np.random.default_rng(2).uniform(0.0, 1.0, (1, 400))
-    data = SimpleNamespace(table=SimpleNamespace(left_out=()), outputs=output, spread=None)
+    data = SimpleNamespace(table=SimpleNamespace(left_out=(), axes=("x",)), outputs=output, spread=None)
     residual = np.round(output * steps) / steps - output
     given = data, SimpleNamespace(response=output), np.full(output.shape, 1e-3), residual
     saw = find_saw(*given, (), 8.0)
@@ -190,6 +190,27 @@ def test_a_saw_of_few_steps_or_of_many_is_proposed(steps: float) -> None:
     assert saw.shape == (pytest.approx(steps, abs=0.25),)
     other = find_saw(*given, saw.shape * (SAW_REJECTIONS + 1), 8.0)
     assert other is None or abs(other.shape[0] - steps) > 0.5, "a rejected saw comes back"
+
+
+def test_a_saw_has_an_offset_of_its_own_in_each_output() -> None:
+    step, offset = 0.025, np.array([[0.004], [0.012]])
+    output = np.random.default_rng(2).uniform(0.0, 1.0, (2, 400))
+    data = SimpleNamespace(
+        table=SimpleNamespace(left_out=(), axes=("x", "y")), outputs=output, spread=None, channels=2, n=400
+    )
+    state = SimpleNamespace(response=output, data=data)
+    residual = offset + step * np.round((output - offset) / step) - output
+    saw = find_saw(data, state, np.full(output.shape, 1e-3), residual, (), 8.0)
+    assert saw is not None
+    assert saw.columns is not None
+    assert saw.starts is not None
+    columns = np.concatenate(saw.columns(state))
+    coefficients = np.linalg.lstsq(columns, residual.ravel(), rcond=None)[0]
+    assert np.std(residual.ravel() - columns @ coefficients) < 0.43 * np.std(residual)  # three harmonics of a saw
+    found = {(name, axis): value for name, axis, value in saw.starts(coefficients)}
+    for axis, of_code in zip("xy", offset.ravel(), strict=True):
+        assert (found["offset", axis] - of_code + step / 2) % step - step / 2 == pytest.approx(0.0, abs=0.05 * step)
+        assert found["step", axis] == pytest.approx(step, rel=2e-3)
 
 
 @pytest.mark.slow
