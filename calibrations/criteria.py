@@ -23,7 +23,7 @@ COVERAGE_FACTOR = 2.0  # standard uncertainties: expanded uncertainty of a resul
 
 # Size of an error
 LEAST_NOISE, NO_MORE_THAN_NOISE = 0.93, 1.06  # excess: between them, one effect or none explains all
-FEWEST_FOR_PLACES = 48  # poses that can show where in the signal chain something acts
+FEWEST_FOR_PLACES = 36  # poses that can show where in the signal chain something acts
 LARGER_NOISE = 1.5  # times the stated noise: less may be effects whose form is nearly right
 MATERIAL = 1.15  # excess: below, the residual is as good as noise
 MOST_SLOW_NOISE = 2.5  # excess: white and slow noise of a sensor alone leave less

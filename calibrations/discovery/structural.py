@@ -10,6 +10,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+import numpy as np
+
 from calibrations.criteria import MATERIAL, MOST_UNEXPLAINED, SIGNIFICANT
 from calibrations.discovery.additions import (
     BASIC,
@@ -42,7 +44,14 @@ from calibrations.free_forms.geometry import GEOMETRY, GeometryEffects
 from calibrations.free_forms.place_names import PREFIX, place_of_effect
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.search import search
-from calibrations.free_forms.stairs import Stairs, before_stairs, find_stairs, fit_stairs, noise_of_rounded
+from calibrations.free_forms.stairs import (
+    Stairs,
+    before_stairs,
+    find_stairs,
+    fit_stairs,
+    noise_before_rounding,
+    noise_of_rounded,
+)
 from calibrations.free_forms.structure import FloorSource, Structure, find_structure, with_stairs
 from calibrations.means.noise import rms, with_white
 from calibrations.model.chain import force
@@ -164,9 +173,23 @@ def _without_idle_additions(
         alternative = fit_together(base, fewer)
         if alternative.held_out_excess <= NO_WORSE * end.held_out_excess:
             kept, without = fewer, alternative
+    for form in _forms_that_raise_the_unseen_error(selected, fits):
+        fewer = [a for a in kept if a is not form]
+        if not fewer or len(fewer) == len(kept):
+            continue
+        alternative = fit_together(base, fewer)
+        if NO_WORSE * alternative.held_out_excess < without.held_out_excess:
+            kept, without = fewer, alternative
     if len(kept) == len(selected):
         return selected, fits
     return kept, [base, *fit_successively(base, without, kept)]
+
+
+def _forms_that_raise_the_unseen_error(selected: list[Addition], fits: list[Fit]) -> list[Addition]:
+    """The free forms with which unseen poses are foreseen worse than before them, the last one first."""
+    steps = zip(selected, pairwise(fits), strict=True)
+    raising = [a for a, (before, after) in steps if after.held_out_excess > before.held_out_excess]
+    return [a for a in reversed(raising) if a.effect.name.startswith(PREFIX)]
 
 
 def _described_by_curves(left_out: Sequence[Addition], kept: Sequence[Addition]) -> bool:
@@ -249,16 +272,20 @@ def _fit_before_stairs(base: Fit, effects: Mapping[str, Effect]) -> tuple[Fit, _
     edges of a coarse converter's steps magnify noise in front of it, so that the error may exceed the noise floor.
     """
     white = base.problem.white
-    if STAIRS not in effects or base.model.holds(STAIRS) or white is None or "output" in base.table.left_out:
+    if STAIRS not in effects or base.model.holds(STAIRS) or "output" in base.table.left_out:
         return base, None, 1.0
     stairs = find_stairs(base.table, base.table.outputs.T - base.residual, white)
     if stairs is None:
         return base, None, 1.0
+    known, white = white is not None, np.full(base.residual.shape, stairs.noise) if white is None else white
     smooth = fit(base.model, before_stairs(base.table, white, stairs))
     places = structure(smooth, effects)
     causes = fit_separately(smooth, places, additions(places, smooth.model, effects))
     forms = free_additions(places, smooth.model)
     stairs = fit_stairs(base.table, places.result.state.predicted, white, stairs)
+    if not known:
+        noise = noise_before_rounding(base.table.outputs.T, places.result.state.predicted, stairs)
+        stairs, white = replace(stairs, noise=noise), np.full(white.shape, noise)
     if stairs.of_means:
         base = _with_edges_at(base, places.result.state.predicted, white, stairs)
     rounding = rounding_addition(effects[STAIRS], stairs, base.table.axes)

@@ -123,7 +123,12 @@ def _acting_place(
 
 
 def _least_size(result: SearchResult, place: str, sizes: PlaceSizes) -> float:
-    """The size from which a place counts beside the others."""
+    """The size from which a place counts beside the others.
+
+    The scatter of the samples, which no force drives, is no remainder of the form of a larger place.
+    """
+    if place == "column:std":
+        return 0.0
     least = LEAST_SHARE * max(sizes.values())
     loops = [name for name in result.active if result.component(name).place == HISTORY]
     in_another_form = place != HISTORY and any(result.component(name).form is not None for name in loops)

@@ -28,9 +28,9 @@ GEOMETRY = ("axis-nonorthogonality", "axis-misalignment", "stage-zero-offset", "
 CAUSE_PRICE, PARAMETER_PRICE = 12.0, 2.0  # of chi-square
 CLOSE = 8.0  # of chi-square: the data cannot separate explanations that differ by less
 LINEAR_PART = 2.0  # of a curve's odd part: the standard deviation of a mechanism's own linear part
-EVEN_PART = 1.0  # the same of its even part
+EVEN_PART = 0.6  # the same of its even part: a square about another zero, at some 0.2 g
 # A scale factor over z multiplies the force from the sensor's own zero, which is at some 50 mg: its line is u0 k z.
-ZERO_PART = 0.1  # of a scale factor over z: the standard deviation of its linear part
+ZERO_PART = 0.1  # of a scale factor over another axis: the standard deviation of its linear part
 # A gap that the out-of-plane force narrows gives a / (1 - k z): its line is to its square as this is to its cube, so
 # that the odd part of its curve tells the line. A misalignment beside it still shows by its angle about z.
 NARROWING, GAP_LINE = 0.05, 5.0  # least odd part of such a curve, and most of its line, both over the even part
@@ -136,7 +136,7 @@ def _linear_part(result: SearchResult, place: str, curve: Array) -> float:
     drivers = {"cross-response": force[:, list(CROSS)].T, "z-response": out_of_plane(force).T}
     total = float(np.mean(curve**2))
     if place not in drivers:
-        return float((ZERO_PART if place == "scale-over-z" else LINEAR_PART) * np.sqrt(total))
+        return float((ZERO_PART if place in ("scale-over-z", "scale-over-cross") else LINEAR_PART) * np.sqrt(total))
     even = 0.0
     for d, row in zip(drivers[place], curve, strict=False):
         X = np.column_stack([np.ones(len(d)), d, *(d**k for k in (*EVEN, *ODD))])

@@ -6,6 +6,7 @@ adds to the output. Constant and linear parts over the forces are in the base (`
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from calibrations.free_forms.components import (
     Columns,
     Component,
     Make,
+    Starts,
     free,
     per_axis,
 )
@@ -37,6 +39,7 @@ LOOPS_G = (0.02, 0.06, 0.15, 0.35, 0.8)  # half widths of the loops of a Preisac
 LOOP_INTERVALS = 8
 DEAD_G = (0.003, 0.012, 0.05)
 THRESHOLDS_G = tuple(np.geomspace(0.002, 0.2, 8).tolist())  # of dead zones that are not all of one width
+OFF_CENTRE_G = 0.02  # a sensor's own zero, about which its dead zone may lie
 KNEE_G = 0.005  # width of the bend where the search for it starts
 ENDS = (0.75, 0.9, 0.97, 0.99)  # of an axis's range, where saturation begins
 DEGREE = 4  # of a general function of the force's direction
@@ -120,26 +123,55 @@ def _response_components(data: PoseData, first: State) -> list[Component]:
         form("quadratic-nonlinearity", lambda s, k: s.force[:, k, None] ** 2),
         form("cubic-nonlinearity", lambda s, k: s.force[:, k, None] ** 3),
         form("odd-quadratic-nonlinearity", lambda s, k: (s.force[:, k] * np.abs(s.force[:, k]))[:, None]),
-        form("scale-factor-asymmetry", lambda s, k: np.abs(s.force[:, k, None])),
+        _asymmetry((0.0,) * data.channels),
         free(Form(place, "curve", "own", _splines_over(first.force, data.channels, 22)), first),
     ]
-    price = 2 * np.log(len(DEAD_G))
-
-    def dead_zone(name: str) -> Make:
-        return lambda shape: Component(
-            name, place, "response", "dead-zone", f"{place}/dead-zone", price, per_axis(_dead_zone(shape)),
-            shape=shape, step=tuple(0.3 * w for w in shape), reshaped=dead_zone(name),
-            starts=lambda _: tuple(("width", axis, abs(w)) for axis, w in zip(data.axes, shape, strict=True)),
-        )  # fmt: skip
-
-    components += [dead_zone(f"{place}/dead-zone@{width:.4f}")((width,) * data.channels) for width in DEAD_G]
+    components += _dead_zones(data)
     components.append(free(Form(place, "thresholds", "own", (Clips(THRESHOLDS_G),)), first, "dead-zone", PRODUCT))
     return components + _saturations(data, first)
 
 
-def _dead_zone(widths: tuple[float, ...]) -> Basis:
-    """Specific force clipped at a width of each channel's own, g."""
-    return lambda s, k: np.clip(s.force[:, k, None], -abs(widths[k]), abs(widths[k]))
+def _asymmetry(zeros: tuple[float, ...]) -> Component:
+    """Two slopes that meet at the own zero of each channel, g."""
+    place, cause = "own-response", "scale-factor-asymmetry"
+    columns = per_axis(lambda s, k: np.abs(s.force[:, k, None] - zeros[k]))
+    return Component(
+        f"{place}/{cause}", place, "response", cause, columns=columns,
+        shape=zeros, step=(OFF_CENTRE_G / 2,) * len(zeros), reshaped=_asymmetry,
+    )  # fmt: skip
+
+
+def _dead_zones(data: PoseData) -> list[Component]:
+    """Dead zones of several widths about several zeros of the channels. Shape: widths, then centres, g."""
+    place, c = "own-response", data.channels
+    shapes = [
+        (*(width,) * c, *centres)
+        for width in DEAD_G
+        for centres in product((-OFF_CENTRE_G, 0.0, OFF_CENTRE_G) if width < OFF_CENTRE_G else (0.0,), repeat=c)
+    ]
+    price = 2 * np.log(len(shapes))
+
+    def make_dead_zone(name: str) -> Make:
+        def starts(shape: tuple[float, ...]) -> Starts:
+            widths, centres = shape[:c], shape[c:]
+            return tuple(
+                (parameter, axis, value)
+                for axis, width, centre in zip(data.axes, widths, centres, strict=True)
+                for parameter, value in (("width", abs(width)), ("centre", centre))
+            )
+
+        return lambda shape: Component(
+            name, place, "response", "dead-zone", f"{place}/dead-zone", price, per_axis(_clipped(shape[:c], shape[c:])),
+            shape=shape, step=tuple(0.3 * abs(w) for w in shape[:c]) * 2, reshaped=make_dead_zone(name),
+            starts=lambda _: starts(shape),
+        )  # fmt: skip
+
+    return [make_dead_zone(f"{place}/dead-zone@{','.join(f'{g:g}' for g in shape)}")(shape) for shape in shapes]
+
+
+def _clipped(widths: tuple[float, ...], centres: tuple[float, ...]) -> Basis:
+    """Specific force about a centre, clipped at a width, of each channel's own, g."""
+    return lambda s, k: np.clip(s.force[:, k, None] - centres[k], -abs(widths[k]), abs(widths[k]))
 
 
 def _saturations(data: PoseData, first: State) -> list[Component]:
@@ -240,13 +272,13 @@ def _cross_axis_components(data: PoseData, first: State) -> list[Component]:
     def square(s: State, k: int) -> Array:
         return out_of_plane(s.force)[:, k, None] ** 2
 
-    def product(s: State, k: int) -> Array:
+    def scaled(s: State, k: int) -> Array:
         perpendicular = out_of_plane(s.force)[:, k]
         return np.column_stack([s.force[:, k] * perpendicular, s.force[:, k] * perpendicular**2])
 
     components += [
         component("z-response", "z-axis-bias", square),
-        component("scale-over-z", "z-axis-scale", product, PRODUCT),
+        component("scale-over-z", "z-axis-scale", scaled, PRODUCT),
     ]
     if inclinations >= FEWEST_INCLINATIONS:
         components += [

@@ -66,13 +66,13 @@ def _readings(table: Table, names: Sequence[str], power: int = 1) -> list[Column
     """Columns to a power as logged, and as their level where scatter is a part of them."""
     logged = tuple(table.column(name) ** power for name in names)
     levels = tuple(level(table, name, power) for name in names)
-    scatter = max(float(np.std(x - y) / (np.std(y) or 1.0)) for x, y in zip(logged, levels, strict=True))
+    scatter = max(float(np.std(x - y) / (np.std(x) or 1.0)) for x, y in zip(logged, levels, strict=True))
     if scatter < LEAST_SCATTER:
         return [ColumnReading(logged)]
+    if not all(level_is_known(table, name, power) for name in names):
+        return [ColumnReading(logged)]  # what the outputs follow differs from row to row by itself
     error = max(reading_error(table, name, power) for name in names)
-    raw = ColumnReading(logged, error=float(np.hypot(scatter, error)))
-    level_known = all(level_is_known(table, name, power) for name in names)
-    return [raw, ColumnReading(levels, True, error)] if level_known else [raw]
+    return [ColumnReading(logged, error=float(np.hypot(scatter, error))), ColumnReading(levels, True, error)]
 
 
 def over_columns(data: PoseData, first: State) -> list[Component]:
@@ -105,17 +105,20 @@ def _supply_component(supply: ColumnReading) -> Component:
 
 
 def _vibration_components(squares: ColumnReading, first: State) -> list[Component]:
-    """A bias over the mean square of the samples of each axis."""
+    """A bias over the mean square of the samples of each axis, whose coefficient may follow the force."""
     place, cause = "column:std", "vibration-rectification"
     columns = per_axis(lambda _, k: (squares.values[k] - squares.values[k].mean())[:, None])
     curves = tuple(spline(q, 6) for q in squares.values)
+    lines = tuple(StraightLine(float(q.min()), float(q.max())) for q in squares.values)
     curve = Form(place, squares.component_name("curve"), "variance", curves, level=squares.is_level)
+    scale = Form(place, squares.component_name("scale-line"), "variance", lines, "force", level=squares.is_level)
     return [
         Component(
             squares.component_name(f"{place}/{cause}"), place, "response", cause, f"{place}/{cause}", squares.price,
             columns, constants=squares.constants, error=squares.error,
         ),
         free(curve, first, price=squares.price, family=f"{place}/curve", error=squares.error),
+        free(scale, first, price=PRODUCT + squares.price, family=f"{place}/scale-line", error=squares.error),
     ]  # fmt: skip
 
 

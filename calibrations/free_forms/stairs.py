@@ -29,6 +29,9 @@ GATHERED = 0.28  # more than the linear model's outputs gather at the same codes
 BY_CHANCE = 3.0  # times the most that outputs at random gather: sqrt(log(frequencies) / outputs)
 AT_END = 3.0  # noises of a mean from a least or greatest output: within, it may lie at a limit of the sensor
 SAME_CODE = 1e-9  # of the range: a smaller difference is one of rounded numbers
+MOST_IN_GAP = 20  # steps between the nearest two of few means
+ROUGH = 0.1  # of what a linear model leaves: where the noise is not known, finer steps are the digits of a file
+UNKNOWN_NOISE = 0.15  # of a step: noise before the rounding until the search is done
 VISIBLE_ROUNDING = 1.0  # noise of a mean, in a step from which its rounding error is not small beside the noise
 REACHED = 3  # codes to either side of the nearest one, that noise may reach
 AT_CODE = 0.02  # of a step: how far a mean at a code may be away from it
@@ -46,6 +49,7 @@ OUTLIER = 1e-6  # least density: one odd output does not decide
 SAW_POINTS = 3.0  # frequencies in a resolved interval
 SAW_REJECTIONS = 1  # of one saw: its phase may belong to an output that is not right yet
 LEAST_OF_SAW = 0.3  # of the first harmonic that a step of this height has
+MOST_OF_SAW = 1.5  # of it: a regular grid of poses has waves over the output that are larger
 SAW_VISIBLE = 2.0  # steps' frequency times the noise of a sample: beyond, nothing is left of a saw in a mean
 
 
@@ -68,18 +72,18 @@ class Stairs:
         return float(np.sqrt(np.mean(self.step**2) / 12))
 
 
-def find_stairs(table: Table, linear: Array, white: Array) -> Stairs | None:
+def find_stairs(table: Table, linear: Array, white: Array | None) -> Stairs | None:
     """The stairs at which the outputs gather, and those of a linear model, (channels, n), do not; None: there are none.
 
-    white   of each mean, (channels, n)
+    white   of each mean, (channels, n); None where it is not known: then means that were rounded themselves are found
 
     A sweep's own regular angles gather outputs as well: the linear model has the same angles and no stairs. Outputs
     at a limit of the sensor gather there, and not at codes: those at either end of the outputs do not count.
     """
-    noise_of_mean = float(np.sqrt(np.mean(white**2)))
-    rounded_means = _stairs_of_means(table.outputs.T, noise_of_mean)
-    if rounded_means is not None:
+    rounded_means = _stairs_of_means(table.outputs.T, linear, white)
+    if rounded_means is not None or white is None:
         return rounded_means
+    noise_of_mean = _rms(white)
     noise = float(np.median(table.optional(table.std_names[0], 0.0)))
     channels, span = table.outputs.T, float(np.ptp(table.outputs)) or 1.0
     highest = min(1 / (FINEST * noise) if noise > 0 else np.inf, MOST_FREQUENCIES / POINTS / span)
@@ -114,34 +118,46 @@ def _stairs_of_channel(values: Array, frequency: float, width: float) -> tuple[f
     return _sharpen_step(values, step, offset, middle, max(width, 0.01 * step))
 
 
-def _stairs_of_means(outputs: Array, white: float) -> Stairs | None:
+def _stairs_of_means(outputs: Array, linear: Array, white: Array | None) -> Stairs | None:
     """The stairs where every mean is at a code itself: means that were logged with few digits; else None.
 
-    outputs  means, (channels, n)
-    white    noise of a mean, which is then the noise before the rounding
+    outputs, linear   means, and those of a linear model, (channels, n)
+    white             noise of a mean, (channels, n), which is then the noise before the rounding; None: not known
 
-    Steps whose rounding error is small beside this noise are those of the digits of any file.
+    Steps whose rounding error is small beside this noise, or beside all that the linear model leaves, are those of the
+    digits of any file.
     """
-    found = [_step_of_means(values, white) for values in outputs]
+    found = [_step_of_means(values) for values in outputs]
     steps = [channel for channel in found if channel is not None]
     if len(steps) < len(found):
         return None
     step, offset = np.array(steps).T[:, :, None]
-    return Stairs(step, offset, white, of_means=True)
+    least = ROUGH * _rms(outputs - linear) if white is None else VISIBLE_ROUNDING * _rms(white)
+    if step.min() < least:
+        return None
+    return Stairs(step, offset, UNKNOWN_NOISE * float(step.mean()) if white is None else _rms(white), of_means=True)
 
 
-def _step_of_means(means: Array, white: float) -> tuple[float, float] | None:
-    """Step and offset of the codes at which every mean of a channel lies; None if there are none."""
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _step_of_means(means: Array) -> tuple[float, float] | None:
+    """Step and offset of the codes at which every mean of a channel lies; None if there are none.
+
+    The least gap between two means is one step, or a few where the means are few.
+    """
     values = np.unique(means)
     gaps = np.diff(values)
     gaps = gaps[gaps > SAME_CODE * np.ptp(values)]
-    if not len(gaps) or gaps.min() < VISIBLE_ROUNDING * white:
-        return None
-    codes = np.concatenate([[0.0], np.cumsum(np.round(np.diff(values) / gaps.min()))])
-    if codes[-1] < FEWEST_STEPS:
-        return None
-    step, offset = np.polyfit(codes, values, 1)
-    return None if np.abs(values - offset - step * codes).max() > AT_CODE * step else (float(step), float(offset))
+    for steps in range(1, MOST_IN_GAP + 1) if len(gaps) else ():
+        codes = np.concatenate([[0.0], np.cumsum(np.round(np.diff(values) / (gaps.min() / steps)))])
+        if codes[-1] < FEWEST_STEPS:
+            continue
+        step, offset = np.polyfit(codes, values, 1)
+        if np.abs(values - offset - step * codes).max() < AT_CODE * step:
+            return float(step), float(offset)
+    return None
 
 
 def noise_of_rounded(values: Array, white: Array, stairs: Stairs) -> Array:
@@ -175,6 +191,20 @@ def _sample_noise(outputs: Array, white: Array, step: Array, offset: Array) -> f
         return float(np.sum(np.log(np.maximum(density, OUTLIER))))
 
     return float(np.mean(step)) * max(NOISES, key=likelihood)
+
+
+def noise_before_rounding(outputs: Array, unrounded: Array, stairs: Stairs) -> float:
+    """The noise before the rounding of means with the greatest likelihood of their codes, in the output's unit.
+
+    outputs, unrounded   means at codes, and expected before the rounding, (channels, n)
+    """
+    deviation = (unrounded - outputs) / stairs.step  # from the code that was logged
+
+    def likelihood(share: float) -> float:
+        chance = ndtr((deviation + 0.5) / share) - ndtr((deviation - 0.5) / share)
+        return float(np.sum(np.log(np.maximum(chance, OUTLIER))))
+
+    return float(np.mean(stairs.step)) * max(NOISES, key=likelihood)
 
 
 def _with_every_code(values: Array, step: float, offset: float) -> tuple[float, float]:
@@ -293,7 +323,10 @@ def find_saw(
     powers = np.stack([_spectrum(v, r, step, count)[-len(frequencies) :] * 2 / w.sum() for v, r, w in channels])
     amplitude = np.sqrt(np.mean(2 * powers / weights.sum(axis=1, keepdims=True), axis=0))
     power = powers.sum(axis=0)
-    power[amplitude < LEAST_OF_SAW * _fundamental(frequencies, noise)] = 0.0  # no saw: a step has a height
+    quiet = np.sqrt(np.maximum(noise**2 - 1 / (3 * frequencies**2), 0.0))  # without the rounding's own
+    is_saw = amplitude > LEAST_OF_SAW * _fundamental(frequencies, noise)  # a step has a height
+    is_saw &= amplitude < MOST_OF_SAW * _fundamental(frequencies, quiet)  # and noise smooths it
+    power[~is_saw] = 0.0
     for f in rejected:
         close = np.abs(frequencies - f) * span < 1.0
         if sum(abs(earlier - f) * span < 1.0 for earlier in rejected) > SAW_REJECTIONS:
@@ -312,7 +345,7 @@ def _threshold(gain: float, channels: int) -> float:
     return float(chdtri(2 * channels, np.exp(-gain / 2)))
 
 
-def _fundamental(frequencies: NDArray[np.floating], noise: float) -> Array:
+def _fundamental(frequencies: NDArray[np.floating], noise: Array | float) -> Array:
     """Amplitude of the first harmonic that a saw of 1 / frequency has in a mean of samples with such noise."""
     step = 1 / frequencies
     return np.asarray(step / np.pi * np.exp(-2 * (np.pi * noise / step) ** 2))

@@ -63,3 +63,19 @@ def test_a_small_misalignment_has_its_name_beside_a_scale_factor_over_the_out_of
     sensed = force[:, :2] + lean * np.column_stack([force[:, 2], -force[:, 2]])
     found = discover(sensed, force[:, :2] * force[:, 2:] ** 2 * [-7e-4, 0.0])
     assert set(found.causes) == {"z-axis-scale", "axis-misalignment"}
+
+
+def test_a_non_orthogonality_has_its_name_beside_a_smaller_scale_factor_over_the_other_axis() -> None:
+    """Such a scale factor multiplies the own force, and has no line over the other force."""
+    force = forces()
+    leaning = force[:, :2] - np.radians(0.05) * np.column_stack([0 * force[:, 0], force[:, 0]])
+    found = discover(leaning, 8e-4 * force[:, :2] * np.tanh(1.2 * force[:, [1, 0]]))
+    assert set(found.causes) == {"cross-axis-scale", "axis-nonorthogonality"}
+
+
+def test_a_non_orthogonality_has_its_name_beside_a_far_smaller_square_of_the_other_axis() -> None:
+    """Only about a zero of more than 0.7 g would the square have such a line."""
+    force = forces()
+    leaning = force[:, :2] - np.radians(0.06) * np.column_stack([0 * force[:, 0], force[:, 0]])
+    found = discover(leaning, 4e-4 * force[:, [1, 0]] ** 2)
+    assert set(found.causes) == {"cross-axis-bias", "axis-nonorthogonality"}

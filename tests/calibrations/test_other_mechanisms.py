@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -120,3 +122,66 @@ def test_an_arm_that_sags_is_an_offset_of_the_stage_and_no_effect_of_the_sensor(
     sag = 0.063 * (1 + 0.15 * np.sin(np.radians(columns["alpha_deg"])))
     found = discover(columns, forces(columns, alpha_deg=sag, beta_deg=-0.03)[:, :2])
     assert found.causes == ("stage-zero-offset",)
+
+
+@pytest.mark.parametrize("centre", [(0.02, -0.025), (0.0, 0.0)])
+def test_a_dead_zone_about_the_own_zero_of_each_axis_has_its_name(centre: tuple[float, float]) -> None:
+    directions = in_all_directions(300, seed=4)
+    own = forces(directions)[:, :2]
+    width = 0.01
+    found = discover(directions, own - np.clip(own - centre, -width, width))
+    assert found.causes == ("dead-zone",)
+    for axis, value in zip("xy", centre, strict=True):
+        assert found.end.params[f"dead-zone.centre.{axis}"].value == pytest.approx(value, abs=1e-3)
+        assert found.end.params[f"dead-zone.width.{axis}"].value == pytest.approx(width, abs=1e-3)
+
+
+def test_three_causes_are_found_in_forty_poses() -> None:
+    directions = in_all_directions(40, seed=6)
+    x, y, z = forces(directions).T
+    added = np.column_stack([2e-3 * z**2 + 2e-3 * x * np.abs(x), -1.5e-3 * z**2 + 3e-3 * y * np.abs(y)])
+    found = discover(directions, np.column_stack([x, y]) + added)
+    assert set(found.causes) == {"z-axis-bias", "odd-quadratic-nonlinearity"}
+
+
+def with_vibration(directions: dict[str, Array], seed: int) -> tuple[dict[str, Array], Array]:
+    """Standard deviations of samples that vibration raises at random, V, and its mean squares, V^2, (n, 2)."""
+    rng = np.random.default_rng(seed)
+    vibration = rng.uniform(0.2, 1.0, (len(directions["t_s"]), 2)) * 8e-3
+    std = np.hypot(vibration, synthetic.NOISE_V * np.sqrt(5000.0))
+    return {"vx_std_v": std[:, 0], "vy_std_v": std[:, 1]}, vibration**2
+
+
+def discover_with_vibration(directions: dict[str, Array], outputs: Array, std: dict[str, Array]) -> Discovery[Fit]:
+    table = synthetic.poses(directions, *(np.array([2.5, 2.52]) + outputs).T)
+    return dataset(replace(table, columns={**table.columns, **std})).discover(read_model("linear"), catalogue())
+
+
+@pytest.mark.slow
+def test_a_drift_keeps_its_name_beside_vibration_that_differs_from_pose_to_pose() -> None:
+    """No level lies beneath the scatter of such standard deviations, so that their readings have no known error."""
+    directions = in_all_directions(300, seed=8)
+    std, squares = with_vibration(directions, seed=9)
+    walk = 1e-4 * np.cumsum(np.random.default_rng(3).standard_normal((300, 2)), axis=0)
+    found = discover_with_vibration(directions, forces(directions)[:, :2] + 30.0 * squares + walk, std)
+    assert set(found.causes) == {"vibration-rectification", "bias-drift"}
+
+
+@pytest.mark.slow
+def test_vibration_that_is_rectified_more_under_load_is_one_cause() -> None:
+    directions = in_all_directions(300, seed=8)
+    std, squares = with_vibration(directions, seed=9)
+    own = forces(directions)[:, :2]
+    found = discover_with_vibration(directions, own + 60.0 * squares * (1 + 0.5 * own), std)
+    assert found.causes == ("vibration-rectification",)
+    assert not found.findings.final.unknown
+    assert found.end.held_out_excess < 1.15
+
+
+@pytest.mark.slow
+def test_rectified_vibration_keeps_its_name_beside_a_far_larger_effect() -> None:
+    directions = in_all_directions(300, seed=8)
+    std, squares = with_vibration(directions, seed=9)
+    own = forces(directions)[:, :2]
+    found = discover_with_vibration(directions, own + 30.0 * squares + 0.05 * own**3, std)
+    assert set(found.causes) == {"cubic-nonlinearity", "vibration-rectification"}

@@ -137,6 +137,24 @@ def test_an_error_of_each_pose_is_no_second_sensor() -> None:
     assert "two groups of rows" in findings(mixed)[0].text
 
 
+def test_strong_effects_at_eight_headings_of_each_mount_are_no_second_sensor() -> None:
+    """Products of the forces have few values there, so that they divide the rows into groups with nothing between."""
+    headings, mounts = np.radians(np.arange(0.0, 360.0, 45.0)), np.radians([40.0, 90.0, 140.0])
+    alpha, beta = (angle.ravel() for angle in np.meshgrid(mounts, headings, indexing="ij"))
+    alpha, beta, flip = np.tile(alpha, 8), np.tile(beta, 8), np.repeat(np.arange(8) % 2, alpha.size)
+    x, y = np.sin(alpha) * np.cos(beta), np.sin(alpha) * np.sin(beta) * (1 - 2 * flip)
+    noise = 6e-5 * np.random.default_rng(3).standard_normal((2, len(x)))
+    saturated = [np.clip(1.2 * a, -1.08, 1.08) for a in (x, y)]
+    columns = {
+        "alpha_deg": np.degrees(alpha), "beta_deg": np.degrees(beta), "flip": flip.astype(float),
+        "t_s": 12.0 * np.arange(len(x)),
+        "vx_v": saturated[0] + 3e-3 * x * y + noise[0], "vy_v": saturated[1] - 5e-3 * x * y + noise[1],
+    }  # fmt: skip
+    assert not any(
+        "two groups" in found.text for found in findings(Table.from_columns("poses", columns, source="made"))
+    )
+
+
 def test_a_model_that_follows_a_few_poses_alone_says_so() -> None:
     found = discover(few_poses(), read_model("linear"), catalogue())
     assert found.end.pooled_excess < MATERIAL < MOST_UNSEEN < found.end.held_out_excess

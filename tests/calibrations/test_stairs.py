@@ -13,10 +13,12 @@ import calibrations as cal
 from calibrations.free_forms.stairs import (
     SAW_REJECTIONS,
     Stairs,
+    _step_of_means,
     before_stairs,
     find_saw,
     find_stairs,
     fit_stairs,
+    noise_before_rounding,
     noise_of_rounded,
 )
 from calibrations.table import Array, Table
@@ -144,6 +146,56 @@ def test_outputs_that_are_not_rounded_have_no_stairs() -> None:
 def test_a_converter_without_stairs_is_no_quantiser_though_a_regular_sweep_gathers_outputs() -> None:
     found = cal.discover(table(before(0.008), 0.0, 0.0008), "linear")
     assert found.causes == ("scale-factor-asymmetry",)
+
+
+def random_poses(count: int, seed: int = 5) -> Array:
+    """Outputs in random directions, (2, n)."""
+    directions = np.random.default_rng(seed).standard_normal((count, 3))
+    return 2.5 + 0.98 * (directions / np.linalg.norm(directions, axis=1, keepdims=True))[:, :2].T
+
+
+def test_the_step_of_few_means_is_found_though_no_two_are_neighbours() -> None:
+    step = 1e-3
+    means = step * np.round(random_poses(40) / step)
+    assert np.diff(np.unique(means[0])).min() > 1.5 * step
+    found = [_step_of_means(values) for values in means]
+    assert [s and s[0] for s in found] == pytest.approx([step, step], rel=1e-6)
+
+
+@pytest.mark.parametrize("noise", [0.1, 0.3])
+def test_rounded_means_of_unknown_noise_are_stairs_and_tell_this_noise(noise: float) -> None:
+    """Noise before the rounding, in steps of 2 mV."""
+    step = 2e-3
+    values = random_poses(400)
+    rounded = step * np.round((values + noise * step * np.random.default_rng(1).standard_normal(values.shape)) / step)
+    columns = {**POSES, "vx_v": rounded[0, : len(POSES["t_s"])], "vy_v": rounded[1, : len(POSES["t_s"])]}
+    measured = Table.from_columns("poses", {k: v[:400] for k, v in columns.items()}, source="made")
+    found = find_stairs(measured, values, None)
+    assert found is not None
+    assert found.of_means
+    np.testing.assert_allclose(found.step, step, rtol=1e-6)
+    assert noise_before_rounding(rounded, values, found) == pytest.approx(noise * step, rel=0.25)
+
+
+def test_the_digits_of_a_file_are_no_stairs_where_the_noise_is_unknown() -> None:
+    values = random_poses(400)
+    means = np.round(values + 5e-5 * np.random.default_rng(1).standard_normal(values.shape), 6)
+    columns = {k: v[:400] for k, v in POSES.items()} | {"vx_v": means[0], "vy_v": means[1]}
+    assert find_stairs(Table.from_columns("poses", columns, source="made"), values, None) is None
+
+
+def test_a_wave_that_the_noise_of_the_samples_would_smooth_is_no_saw() -> None:
+    """A regular grid of poses has waves over the output, larger than any converter of that step leaves in a mean."""
+    noise = 5e-4
+    output = np.random.default_rng(2).uniform(0.0, 1.0, (1, 400))
+    data = SimpleNamespace(
+        table=SimpleNamespace(left_out=(), axes=("x",)), outputs=output, spread=np.full((1, 400), noise)
+    )
+    state, white = SimpleNamespace(response=output), np.full(output.shape, 3e-5)
+    wave = 4e-5 * np.sin(2 * np.pi * output / (0.7 * noise))
+    assert find_saw(data, state, white, wave, (), 8.0) is None
+    coarse = find_saw(data, state, white, np.round(output / 2e-3) * 2e-3 - output, (), 8.0)
+    assert coarse is not None
 
 
 @pytest.mark.parametrize("limit", [0.9, 0.6])

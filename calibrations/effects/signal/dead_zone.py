@@ -7,7 +7,7 @@ from calibrations.table import Array, Table
 class DeadZone(Effect):
     """dead-zone: specific force below a threshold gives no output, and the threshold is missing from larger forces.
 
-        a_i <- a_i - w_i for a_i > w_i,   a_i + w_i for a_i < -w_i,   0 between          w in g, one per axis
+        a_i <- a_i - w_i for a_i > c_i + w_i,   a_i + w_i for a_i < c_i - w_i,   c_i between      w, c in g, per axis
 
     Symptom   the residual jumps where the specific force of its own axis changes sign, and is flat on both sides.
     Excited by  positions close to 0 g on both sides, and others far from it.
@@ -18,6 +18,7 @@ class DeadZone(Effect):
     kinds = ("poses", "motion")
 
     width = Parameter("g", typical=0.01, starts=(0.003, 0.05), low=0.0, high=0.5, doc="greatest without output")
+    centre = Parameter("g", typical=0.01, low=-0.5, high=0.5, assumed=0.0, doc="force at the middle of it")
 
     def force(self, a: Array, table: Table, p: Values) -> Array:
-        return a - np.clip(a, -p.width, p.width)
+        return a - np.clip(a - p.centre, -p.width, p.width)
