@@ -44,6 +44,7 @@ KNEE_G = 0.005  # width of the bend where the search for it starts
 ENDS = (0.75, 0.9, 0.97, 0.99)  # of an axis's range, where saturation begins
 DEGREE = 4  # of a general function of the force's direction
 FEWEST_ANGLES, FINE_ANGLES = 8, 33  # different angles beta that can show harmonics, and fine ones
+FEWEST_HEADINGS = 6  # the same for a few harmonics
 FEWEST_INCLINATIONS = 4
 
 
@@ -75,12 +76,13 @@ def _stages(data: PoseData, first: State) -> list[Component]:
     components: list[Component] = []
     place = "stage-angle-beta"
     angles = len(np.unique(np.round(np.mod(data.beta, 2 * np.pi), 3)))
-    if angles > FEWEST_ANGLES:
+    if angles >= FEWEST_HEADINGS:
         eccentricity = Harmonics(1, 1)(data.beta)
         components.append(
             Component(f"{place}/stage-eccentricity", place, "beta", "stage-eccentricity", angle=eccentricity)
         )
-        components.append(free(Form(place, "curve", "beta", (Harmonics(2, 9),), shared=True), first))
+        waves = Harmonics(2, 9 if angles > FEWEST_ANGLES else (angles - 1) // 2)  # a shorter one would look like these
+        components.append(free(Form(place, "curve", "beta", (waves,), shared=True), first))
         if angles > FINE_ANGLES:
             fine = Form(place, "fine", "beta", (Harmonics(4, 16, power=0.0),), shared=True)
             components.append(free(fine, first, price=PRODUCT))
