@@ -22,6 +22,7 @@ LEAST_SIZE = 0.6  # noise floors: a smaller place is a refinement
 LEAST_OWN = 0.3  # noise floors: part of a place with a cause that no other place explains, if the residual is noise
 LEAST_SHARE = 0.015  # of the largest place's size
 LEAST_BESIDE_LOOPS = 0.1  # of the size of a hysteresis in another form, of which slip elements leave a part
+LEAST_BESIDE_STEPS = 0.1  # of the size of a converter's steps, for what has corners over the force as they have
 LEAST_UNKNOWN = 1.0  # noise floors: size of a place whose cause is unknown
 LEAST_UNKNOWN_SHARE = 0.05  # of the largest place's size: the part of such a place that no other one explains
 READING_ERRORS = 1.5  # times the residual by the errors of noisy columns, whose size is uncertain
@@ -130,6 +131,8 @@ def _least_size(result: SearchResult, place: str, sizes: PlaceSizes) -> float:
     if place == "column:std":
         return 0.0
     least = LEAST_SHARE * max(sizes.values())
+    if place == "own-response" and STEPS in result.active:
+        least = max(least, LEAST_BESIDE_STEPS * sizes["output"])
     loops = [name for name in result.active if result.component(name).place == HISTORY]
     in_another_form = place != HISTORY and any(result.component(name).form is not None for name in loops)
     return max(least, LEAST_BESIDE_LOOPS * sizes[HISTORY]) if in_another_form else least

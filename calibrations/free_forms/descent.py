@@ -15,6 +15,7 @@ from calibrations.free_forms.chain import Coefficients, State, start
 from calibrations.free_forms.components import Component
 from calibrations.free_forms.jumps import STEPS, find_jumps
 from calibrations.free_forms.places import components as all_components
+from calibrations.free_forms.places import is_off_centre
 from calibrations.free_forms.reml import (
     Gram,
     Sizes,
@@ -103,7 +104,7 @@ def _begin(setting: Setting, general: bool, loops: bool, jumps: bool) -> Point:
     components = [
         c
         for c in all_components(data, state, setting.flicker)
-        if (general or not c.general) and (loops or not c.has_loops)
+        if (general or not c.general) and (loops or not c.has_loops) and not (jumps and is_off_centre(c))
     ]
     saw = find_saw(data, state, setting.white, data.outputs - state.predicted, (), ENTER)
     steps = setting.first_jumps if jumps else None

@@ -171,6 +171,12 @@ def _dead_zones(data: PoseData) -> list[Component]:
     return [make_dead_zone(f"{place}/dead-zone@{','.join(f'{g:g}' for g in shape)}")(shape) for shape in shapes]
 
 
+def is_off_centre(component: Component) -> bool:
+    """Whether a component is a dead zone away from 0 g, which may be the step of a converter at another voltage."""
+    shape = component.shape
+    return component.cause == "dead-zone" and any(shape[len(shape) // 2 :])
+
+
 def _clipped(widths: tuple[float, ...], centres: tuple[float, ...]) -> Basis:
     """Specific force about a centre, clipped at a width, of each channel's own, g."""
     return lambda s, k: np.clip(s.force[:, k, None] - centres[k], -abs(widths[k]), abs(widths[k]))

@@ -19,7 +19,7 @@ from calibrations.effects.signal.quantisation import mean_of_rounded
 from calibrations.free_forms.chain import State
 from calibrations.free_forms.components import Component, Starts, per_axis
 from calibrations.free_forms.poses import PoseData
-from calibrations.means.noise import with_white
+from calibrations.means.noise import rms, with_white
 from calibrations.table import Array, Table
 
 FEWEST_STEPS = 3  # in the range of the outputs
@@ -83,7 +83,7 @@ def find_stairs(table: Table, linear: Array, white: Array | None) -> Stairs | No
     rounded_means = _stairs_of_means(table.outputs.T, linear, white)
     if rounded_means is not None or white is None:
         return rounded_means
-    noise_of_mean = _rms(white)
+    noise_of_mean = float(rms(white.ravel()))
     noise = float(np.median(table.optional(table.std_names[0], 0.0)))
     channels, span = table.outputs.T, float(np.ptp(table.outputs)) or 1.0
     highest = min(1 / (FINEST * noise) if noise > 0 else np.inf, MOST_FREQUENCIES / POINTS / span)
@@ -132,14 +132,12 @@ def _stairs_of_means(outputs: Array, linear: Array, white: Array | None) -> Stai
     if len(steps) < len(found):
         return None
     step, offset = np.array(steps).T[:, :, None]
-    least = ROUGH * _rms(outputs - linear) if white is None else VISIBLE_ROUNDING * _rms(white)
-    if step.min() < least:
-        return None
-    return Stairs(step, offset, UNKNOWN_NOISE * float(step.mean()) if white is None else _rms(white), of_means=True)
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+    if white is None:
+        noise, least = UNKNOWN_NOISE * float(step.mean()), ROUGH * float(rms((outputs - linear).ravel()))
+    else:
+        noise = float(rms(white.ravel()))
+        least = VISIBLE_ROUNDING * noise
+    return Stairs(step, offset, noise, of_means=True) if step.min() >= least else None
 
 
 def _step_of_means(means: Array) -> tuple[float, float] | None:

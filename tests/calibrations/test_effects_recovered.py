@@ -198,10 +198,11 @@ def _ways(columns: Columns) -> Iterator[Array]:
         before = alpha, beta
 
 
-@made("dead-zone", width__x=0.02, width__y=0.05)
+@made("dead-zone", width__x=0.02, width__y=0.05, centre__x=-0.01, centre__y=0.02)
 def _dead_zone(columns: Columns, a: Array) -> Array:
-    width = np.array([[0.02], [0.05]])
-    return linear(np.sign(a[:2]) * np.maximum(np.abs(a[:2]) - width, 0.0))
+    width, centre = np.array([[0.02], [0.05]]), np.array([[-0.01], [0.02]])
+    from_centre = a[:2] - centre
+    return linear(centre + np.sign(from_centre) * np.maximum(np.abs(from_centre) - width, 0.0))
 
 
 @made("saturation", high__x=3.3, high__y=3.25, low__x=1.7, low__y=1.8, loss=1.0, knee=0.02)

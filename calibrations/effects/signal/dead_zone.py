@@ -3,6 +3,8 @@ import numpy as np
 from calibrations.effects import Effect, Parameter, Values
 from calibrations.table import Array, Table
 
+ZERO_G = 0.05  # standard deviation of the sensor's own zero: without poses in the zone, its middle is not known
+
 
 class DeadZone(Effect):
     """dead-zone: specific force below a threshold gives no output, and the threshold is missing from larger forces.
@@ -18,7 +20,13 @@ class DeadZone(Effect):
     kinds = ("poses", "motion")
 
     width = Parameter("g", typical=0.01, starts=(0.003, 0.05), low=0.0, high=0.5, doc="greatest without output")
-    centre = Parameter("g", typical=0.01, low=-0.5, high=0.5, assumed=0.0, doc="force at the middle of it")
+    centre = Parameter(
+        "g",
+        typical=0.01,
+        prior=dict.fromkeys("xyz", ZERO_G),
+        assumed=0.0,
+        doc="force at the middle of it; only poses in the zone show it",
+    )
 
     def force(self, a: Array, table: Table, p: Values) -> Array:
         return a - np.clip(a - p.centre, -p.width, p.width)
