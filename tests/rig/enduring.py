@@ -14,6 +14,7 @@ from drivers.digital.settings import FORCES
 from drivers.errors import DriverError
 from drivers.transport.faults import Fault, kinds_of
 from procedures.errors import ProcedureError
+from procedures.level_check import reversal
 from procedures.session import Dwell, Reading
 from rig.bench import Bench
 from rig.cli.terminal.failure import status_of
@@ -95,7 +96,8 @@ def endured(procedure: str, role: str, fault: Fault, driver: str = "", guided: b
     `guided`: a person is asked after the stop, resumes the run at once, and ends it if the fault is still there.
     """
     person = Onlooker(wishes=["resume"] if guided else [])
-    guarded = fault.what in NEEDS_A_GUARD
+    guarded, digital = fault.what in NEEDS_A_GUARD, driver in FREE_RUNNING
+    lying = (role, fault.what) == ("level", "lies")
     with Record() as record, looking_on() as aftermath:
         before = len(record.runs())
         try:
@@ -106,7 +108,7 @@ def endured(procedure: str, role: str, fault: Fault, driver: str = "", guided: b
             return "not begun"
         assert bool(person.outcomes) or outcome.error is None, "the person is asked"
         if outcome.error is None:
-            _require_right(record, outcome, undisturbed(procedure, guarded, driver), driver in FREE_RUNNING)
+            _require_right(record, outcome, undisturbed(procedure, guarded, driver), digital, lying)
             return "complete"
         _require_safe(outcome, role, fault, aftermath, driver)
         done = resume(record, outcome.run.run, Onlooker(), bench_for(guarded, driver))
@@ -118,10 +120,8 @@ def endured(procedure: str, role: str, fault: Fault, driver: str = "", guided: b
                 kept.pose for kept in undisturbed(procedure, driver=driver)[1]
             ]
             return "stopped"
-        if (
-            fault.what in OTHER_NOISE or driver in FREE_RUNNING or (role, fault.what) == ("level", "lies")
-        ):  # what the level said is read again
-            _require_right(record, done, undisturbed(procedure, guarded, driver), driver in FREE_RUNNING)
+        if fault.what in OTHER_NOISE or digital or lying:  # what the level said is read again
+            _require_right(record, done, undisturbed(procedure, guarded, driver), digital, lying)
         else:
             assert digest(record, done.run.run) == undisturbed(procedure, guarded, driver)[0], (
                 "goes on as if nothing had been"
@@ -130,19 +130,36 @@ def endured(procedure: str, role: str, fault: Fault, driver: str = "", guided: b
 
 
 def _require_right(
-    record: Record, outcome: Outcome, expected: tuple[Any, list[KeptPose], list[Reading], float], digital: bool
+    record: Record,
+    outcome: Outcome,
+    expected: tuple[Any, list[KeptPose], list[Reading], float],
+    digital: bool,
+    lying: bool,
 ) -> None:
-    """A run that noticed nothing has measured what an undisturbed one does, or a result of it says so."""
+    """A run that noticed nothing has measured what an undisturbed one does, or a result of it says so.
+
+    `lying`: the level has a constant error. The half turn removes it, so the tilts are compared.
+    """
     assert outcome.run.state == "complete"
     _, sound, readings, _ = expected
     kept = included(record, outcome.run.run)
     assert [each.pose for each in kept] == [each.pose for each in sound]
     wrong = not all(_is_near(one.dwell, other.dwell, digital) for one, other in zip(kept, sound, strict=True))
-    found = {reading.name: reading.value for reading in record.readings(outcome.run.run)}
-    same = (reading for reading in readings if reading.unit in NEAR)  # not counts of lost samples
-    wrong = wrong or any(abs(found[reading.name] - reading.value) > NEAR[reading.unit] for reading in same)
+    found, right = (_tilts(each) if lying else each for each in (record.readings(outcome.run.run), readings))
+    values = {reading.name: reading.value for reading in found}
+    same = (reading for reading in right if reading.unit in NEAR)  # not counts of lost samples
+    wrong = wrong or any(abs(values[reading.name] - reading.value) > NEAR[reading.unit] for reading in same)
     marked = any(result["verdict"] == "fail" for result in outcome.run.results.values()) or outcome.run.message
     assert not wrong or marked, "a wrong number without a mark"
+
+
+def _tilts(readings: list[Reading]) -> list[Reading]:
+    """The readings; instead of those of the level at the front and at the back, the tilt from both."""
+    values = {reading.name: reading.value for reading in readings}
+    fronts = [name for name in values if name.startswith("level-front-")]
+    backs = {name: name.replace("front", "back") for name in fronts}
+    tilts = [Reading(name, reversal(values[name], values[backs[name]])[0], "deg") for name in fronts]
+    return tilts + [reading for reading in readings if reading.name not in {*backs, *backs.values()}]
 
 
 def _is_near(one: Dwell, other: Dwell, digital: bool) -> bool:

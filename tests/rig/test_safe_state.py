@@ -90,6 +90,11 @@ def test_a_turn_is_resumed_with_a_tracker_that_needs_a_second_to_begin() -> None
     assert endured("rate-turn", "adc", Fault("garbage", at_s=70.478), "xsens_mti") == "stopped"
 
 
+def test_a_level_with_a_constant_error_gives_the_right_tilt_when_it_is_read_again() -> None:
+    """The error begins between both readings and stops the run. The person resumes; the half turn removes the error."""
+    assert endured("noise-floor", "level", Fault("lies", at_s=11.773), guided=True) == "complete"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("procedure", "role", "what"), GUIDED)
 def test_a_guided_run_asks_when_all_is_at_rest(procedure: str, role: str, what: str) -> None:
