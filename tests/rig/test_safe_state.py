@@ -96,6 +96,17 @@ def test_a_level_with_a_constant_error_gives_the_right_tilt_when_it_is_read_agai
 
 
 @pytest.mark.slow
+def test_a_run_is_resumed_when_a_sensor_that_was_too_hot_has_cooled() -> None:
+    """Its last pose is at 83.4 C of 85 C: without the wait the temperature exceeds the limit again."""
+    assert endured("temperature-cycle", "oven", Fault("runaway", at_s=663.845), guided=True) == "stopped"
+
+
+def test_a_converter_whose_segments_are_sent_again_measures_later() -> None:
+    """The fault delays the end of the first record by 0.4 s: the poses after it have other noise."""
+    assert endured("rate-turn", "adc", Fault("flipped-bit", at_s=21.983)) == "stopped"
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("procedure", "role", "what"), GUIDED)
 def test_a_guided_run_asks_when_all_is_at_rest(procedure: str, role: str, what: str) -> None:
     fault = Fault(what, at_s=moment(procedure, role, what))
