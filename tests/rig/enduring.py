@@ -19,6 +19,7 @@ from procedures.level_check import reversal
 from procedures.session import Dwell, Reading
 from rig.bench import Bench
 from rig.cli.terminal.failure import status_of
+from rig.instruments.guard import NOW_AND_THEN_S
 from rig.instruments.instruments import connect_all
 from rig.record import KeptPose, Record
 from rig.runs.runner import Outcome, resume
@@ -53,6 +54,7 @@ OTHER_PARTS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {  # roles and 
 OTHER_FAULTS = [(driver, roles[-1], what) for driver, (roles, _) in OTHER_PARTS.items() for what in kinds_of(driver)]
 NEEDS_A_GUARD = {"open-interlock"}  # felt only by a bench that has interlocks
 FREE_RUNNING = {"imu_lines", "mavlink_imu", "xsens_mti"}  # a resumed run meets other samples of the same sensor
+WRONG_LEVEL = {"lies", "stale"}  # read again after the first; of the second, a mean may have a part
 OTHER_NOISE = {"delay", "endless", "trickle"}  # after which a run may go on, at other times: as good, but not the same
 COOLING_S = 3600.0  # until a sensor that was too hot is inside its limits
 NEAR_V = 5e-3  # of a dwell's mean: ten times its noise
@@ -114,19 +116,21 @@ def endured(procedure: str, role: str, fault: Fault, driver: str = "", guided: b
             _require_right(record, outcome, undisturbed(procedure, guarded, driver), digital, lying)
             return "complete"
         _require_safe(outcome, role, fault, aftermath, driver)
-        if fault.what == "runaway":
+        hot = role == "oven" and fault.what in ("runaway", "stale")
+        if hot:
+            _require_true_temperatures(record, outcome, fault)
             _cool(record, outcome.run.run)
         done = resume(record, outcome.run.run, Onlooker(), bench_for(guarded, driver))
         assert (done.run.state, done.error) == ("complete", None)
         if procedure in STRETCHES:
             return "stopped"
-        if (role, fault.what) == ("oven", "runaway"):  # what was kept before it was noticed is hotter, and says so
+        if hot:  # what was kept before a runaway was noticed is hotter, and says so
             assert [kept.pose for kept in included(record, done.run.run)] == [
                 kept.pose for kept in undisturbed(procedure, driver=driver)[1]
             ]
             return "stopped"
         later = fault.what in OTHER_NOISE or (fault.what == "flipped-bit" and _is_resent(role, driver))
-        if later or digital or lying:  # what the level said is read again
+        if later or digital or (role == "level" and fault.what in WRONG_LEVEL):
             _require_right(record, done, undisturbed(procedure, guarded, driver), digital, lying)
         else:
             assert digest(record, done.run.run) == undisturbed(procedure, guarded, driver)[0], (
@@ -139,6 +143,13 @@ def _is_resent(role: str, driver: str = "") -> bool:
     """Whether the link sends a damaged message again: it arrives later."""
     twin = importlib.import_module(f"drivers.{driver or BENCH.instruments[role].driver}.twin")
     return bool(twin.LISTEN.startswith("tcp:"))
+
+
+def _require_true_temperatures(record: Record, outcome: Outcome, fault: Fault) -> None:
+    """No pose counts whose temperature was read from a stuck thermometer."""
+    if fault.what == "stale":
+        late = [k.pose for k in included(record, outcome.run.run) if k.samples.start_s > fault.at_s + NOW_AND_THEN_S]
+        assert not late, "a temperature of a stuck thermometer"
 
 
 def _cool(record: Record, run: str) -> None:

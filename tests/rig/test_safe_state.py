@@ -101,6 +101,15 @@ def test_a_run_is_resumed_when_a_sensor_that_was_too_hot_has_cooled() -> None:
     assert endured("temperature-cycle", "oven", Fault("runaway", at_s=663.845), guided=True) == "stopped"
 
 
+def test_poses_since_the_thermometer_stuck_are_measured_again() -> None:
+    """It sticks at 37.4 C, close enough to the set point 40 C; the approach to 50 C shows it eight poses later."""
+    assert endured("temperature-cycle", "oven", Fault("stale", at_s=195.393), guided=True) == "stopped"
+
+
+def test_a_level_that_repeats_its_last_reading_adds_little_to_the_mean_before() -> None:
+    assert endured("level-check", "level", Fault("stale", at_s=3.271)) == "stopped"
+
+
 def test_a_converter_whose_segments_are_sent_again_measures_later() -> None:
     """The fault delays the end of the first record by 0.4 s: the poses after it have other noise."""
     assert endured("rate-turn", "adc", Fault("flipped-bit", at_s=21.983)) == "stopped"
