@@ -101,6 +101,10 @@ def test_a_run_is_resumed_when_a_sensor_that_was_too_hot_has_cooled() -> None:
     assert endured("temperature-cycle", "oven", Fault("runaway", at_s=663.845), guided=True) == "stopped"
 
 
+def test_an_oven_that_restarts_in_a_soak_is_soaked_again_before_the_first_pose() -> None:
+    assert endured("temperature-cycle", "oven", Fault("restart", at_s=686.367)) == "complete"
+
+
 def test_poses_since_the_thermometer_stuck_are_measured_again() -> None:
     """It sticks at 37.4 C, close enough to the set point 40 C; the approach to 50 C shows it eight poses later."""
     assert endured("temperature-cycle", "oven", Fault("stale", at_s=195.393), guided=True) == "stopped"
