@@ -63,13 +63,28 @@ def staircase(temperatures_c: tuple[float, ...], cycles: int) -> list[tuple[str,
 def _warm(rig: Session, set_c: float, soak_s: float, begins: bool) -> None:
     """Set the oven to `set_c`; soak at the beginning of a step, or if the oven has cooled during an interruption.
 
-    The oven gets its set point before every pose, so that a resumed run sends the same commands.
+    A second soak follows if the first does not end near `set_c`: the controller was without power for a moment, or the
+    soak is too short.
     """
+    _heat(rig, set_c)
+    is_near = _is_near(rig, set_c)
+    if begins or not is_near:
+        _soak(rig, soak_s)
+        if _is_near(rig, set_c) is False:
+            _heat(rig, set_c)
+            _soak(rig, soak_s)
+
+
+def _heat(rig: Session, set_c: float) -> None:
+    """Set the oven to `set_c`: before every pose, so that a resumed run sends the same commands."""
     rig.oven.set_temperature(set_c)
     rig.oven.run(True)
+
+
+def _is_near(rig: Session, set_c: float) -> bool | None:
+    """Whether the temperature is that of the set point; None if it is unknown."""
     actual_c = rig.oven.temperature_c()
-    if begins or actual_c is None or abs(actual_c - set_c) > LARGEST_DRIFT_K:
-        _soak(rig, soak_s)
+    return None if actual_c is None else abs(actual_c - set_c) <= LARGEST_DRIFT_K
 
 
 def _soak(rig: Session, soak_s: float) -> None:

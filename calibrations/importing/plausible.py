@@ -35,6 +35,7 @@ ARC_MINUTE_DEG = 1 / 60
 ROUNDING_DEG = 1e-3
 FEWEST_RATES = 2  # on one grid by chance, and off the grid of round numbers: one table in a thousand
 FASTEST_RAD_S = 60.0
+LARGEST = 1e9  # more than any angle or rate
 RATE_ROUNDING = 1e-3
 ROUND_DEG_S = 0.05
 Doubt = tuple[str, str]  # the reason, and the unit that would fit, "" for none
@@ -48,11 +49,16 @@ def find_unit_doubts(table: Table, stated_columns: Collection[str]) -> dict[str,
 
 def looks_like_radians(values: Array) -> bool:
     """Whether angles lie within one turn in rad and off the grid of whole arc minutes on which degrees are set."""
-    distinct: Array = np.unique(np.round(np.abs(values), 6))
-    distinct = distinct[distinct > ROUNDING_DEG]
+    distinct = _distinct_magnitudes(values)
     if not len(distinct) or distinct[-1] > 2 * np.pi * 1.001 or _is_on_grid(distinct, ARC_MINUTE_DEG, ROUNDING_DEG):
         return False
     return len(distinct) >= FEWEST_ANGLES or _is_on_grid(distinct, np.pi / 36, ROUNDING_DEG)
+
+
+def _distinct_magnitudes(values: Array) -> Array:
+    """The different magnitudes above 0. Those beyond every unit count as one: 1e308 cannot be rounded."""
+    distinct: Array = np.unique(np.round(np.minimum(np.abs(values), LARGEST), 6))
+    return distinct[distinct > ROUNDING_DEG]
 
 
 def _is_on_grid(values: Array, step: float, rounding: float) -> bool:
@@ -124,8 +130,7 @@ def _angle(values: Array) -> Doubt | None:
 
 def _rate(values: Array) -> Doubt | None:
     """Rates that are whole multiples of 5 deg/s if they are in rad/s, and no round numbers as they are."""
-    distinct: Array = np.unique(np.round(np.abs(values), 6))
-    distinct = distinct[distinct > ROUNDING_DEG]
+    distinct = _distinct_magnitudes(values)
     if (
         len(distinct) < FEWEST_RATES
         or distinct[-1] > FASTEST_RAD_S

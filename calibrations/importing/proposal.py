@@ -290,8 +290,9 @@ def _is_output(unitless: str) -> bool:
 
 def _is_angle(values: Array) -> bool:
     """Whether numbers lie on a grid of degrees within a turn either way, and some exceed a turn in rad."""
-    on_grid = np.all(np.abs(values * 4 - np.round(values * 4)) < 1e-6)
-    return bool(len(values) and on_grid and 2 * np.pi < np.max(np.abs(values)) <= 360)
+    if not 2 * np.pi < np.max(np.abs(values), initial=0.0) <= 360:
+        return False
+    return bool(np.all(np.abs(values * 4 - np.round(values * 4)) < 1e-6))
 
 
 def _unit(laid: Sheet, name: str, target: str, values: Array) -> str:

@@ -56,7 +56,8 @@ class Oven:
         self._unit, self._clock = unit, clock
         self._told_c: float | None = None  # the last set point sent
         self._running = False  # whether it was switched on
-        self._shown_c, self._since_s = math.nan, 0.0  # the last temperature; since when it should have changed
+        self._shown_c, self._first_s = math.nan, 0.0  # the last temperature, and the time of the first equal reading
+        self._since_s = 0.0  # since when it should have changed
 
     def identify(self) -> Identity:
         """A general name, after an exchange: the controller has no register with its name."""
@@ -117,14 +118,21 @@ class Oven:
             )
 
     def _require_fresh(self, shown_c: float) -> None:
-        """Check that the reading changes on the way to a set point; otherwise the thermometer is stuck."""
+        """Check that the reading changes on the way to a set point; otherwise the thermometer is stuck.
+
+        It is stuck since the first of the equal readings, which may be at an earlier set point.
+        """
+        now_s, is_new = self._clock.now(), shown_c != self._shown_c
+        if is_new:
+            self._shown_c, self._first_s = shown_c, now_s
         under_way = self._running and self._told_c is not None and abs(shown_c - self._told_c) > ARRIVAL_K
-        if shown_c != self._shown_c or not under_way:
-            self._shown_c, self._since_s = shown_c, self._clock.now()
-        elif (still_s := self._clock.now() - self._since_s) > self.settings.stale_s:
+        if is_new or not under_way:
+            self._since_s = now_s
+        elif (still_s := now_s - self._since_s) > self.settings.stale_s:
             raise SensorFault(
                 f"{self.name}: has shown {shown_c:.1f} C for {still_s:.0f} s while approaching {self._told_c:g} C",
                 "Check the place of the thermocouple and the heater; switch the controller off and on",
+                self._first_s,
             )
 
 

@@ -101,6 +101,7 @@ def test_what_nobody_knows_a_unit_for_may_still_be_stated() -> None:
         ([0.0, 0.0], False),
         (TURN, False),
         ([0.3, 0.7], False),  # two values say too little
+        ([0.5, 1e308], False),  # too large to be rounded
     ],
 )
 def test_radians_are_off_every_grid_of_degrees(angles: Sequence[float], expected: bool) -> None:

@@ -95,6 +95,18 @@ def test_a_repeated_set_point_hides_no_stuck_thermometer(oven: Callable[..., Any
     assert clock.now() < 500.0
 
 
+def test_a_thermometer_that_sticks_at_a_set_point_is_stuck_since_its_first_equal_reading(
+    oven: Callable[..., Any], clock: SimulatedClock
+) -> None:
+    """Near the set point 32 C a constant temperature is no fault; on the way to 60 C it is. All between is wrong."""
+    stuck = oven(Fault("stale", at_s=300.0))
+    heating(stuck, clock, 32.0, 20.0, 1200.0)
+    assert abs(stuck.temperature_c() - 32.0) < 5.0
+    with pytest.raises(SensorFault, match="while approaching 60 C") as caught:
+        heating(stuck, clock, 60.0, 20.0, 7200.0)
+    assert caught.value.since_s == pytest.approx(300.0, abs=60.0)
+
+
 def test_a_thermometer_that_has_stuck_is_found_while_the_heater_follows_it(
     oven: Callable[..., Any], world: World, clock: SimulatedClock
 ) -> None:

@@ -54,7 +54,7 @@ def test_slopes_and_hysteresis_are_those_of_the_package() -> None:
 
 def test_the_oven_gets_its_set_point_before_every_pose_and_is_off_at_the_end() -> None:
     rig, book = session(world(0.0))
-    temperature_cycle(rig, temperatures_c=(35.0, 40.0), soak_s=0.0, dwell_s=0.1)
+    temperature_cycle(rig, temperatures_c=(35.0, 40.0), soak_s=7200.0, dwell_s=0.1)
     assert isinstance(rig.oven, Oven)
     assert rig.oven.told == [35.0, True] * 8 + [40.0, True] * 8 + [35.0, True] * 8 + [False]
     assert {d.pose.path for d in book.dwells} == {"up 35 cycle 1", "up 40 cycle 1", "down 35 cycle 1"}

@@ -4,6 +4,7 @@ and goes on to the same end once the fault is gone. Used by a sample in the test
 
 from __future__ import annotations
 
+import importlib
 import math
 import random
 import zlib
@@ -14,9 +15,12 @@ from drivers.digital.settings import FORCES
 from drivers.errors import DriverError
 from drivers.transport.faults import Fault, kinds_of
 from procedures.errors import ProcedureError
+from procedures.level_check import reversal
 from procedures.session import Dwell, Reading
 from rig.bench import Bench
 from rig.cli.terminal.failure import status_of
+from rig.instruments.guard import NOW_AND_THEN_S
+from rig.instruments.instruments import connect_all
 from rig.record import KeptPose, Record
 from rig.runs.runner import Outcome, resume
 from tests.rig.misbehaving import (
@@ -50,7 +54,9 @@ OTHER_PARTS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {  # roles and 
 OTHER_FAULTS = [(driver, roles[-1], what) for driver, (roles, _) in OTHER_PARTS.items() for what in kinds_of(driver)]
 NEEDS_A_GUARD = {"open-interlock"}  # felt only by a bench that has interlocks
 FREE_RUNNING = {"imu_lines", "mavlink_imu", "xsens_mti"}  # a resumed run meets other samples of the same sensor
+WRONG_LEVEL = {"lies", "stale"}  # read again after the first; of the second, a mean may have a part
 OTHER_NOISE = {"delay", "endless", "trickle"}  # after which a run may go on, at other times: as good, but not the same
+COOLING_S = 3600.0  # until a sensor that was too hot is inside its limits
 NEAR_V = 5e-3  # of a dwell's mean: ten times its noise
 NEAR_DIGITAL = 0.05  # of a mean in g or m/s^2
 NEAR_NOISES = 8.0  # of a mean of a gyroscope or magnetometer in any unit: standard errors of a difference
@@ -95,7 +101,8 @@ def endured(procedure: str, role: str, fault: Fault, driver: str = "", guided: b
     `guided`: a person is asked after the stop, resumes the run at once, and ends it if the fault is still there.
     """
     person = Onlooker(wishes=["resume"] if guided else [])
-    guarded = fault.what in NEEDS_A_GUARD
+    guarded, digital = fault.what in NEEDS_A_GUARD, driver in FREE_RUNNING
+    lying = (role, fault.what) == ("level", "lies")
     with Record() as record, looking_on() as aftermath:
         before = len(record.runs())
         try:
@@ -106,22 +113,25 @@ def endured(procedure: str, role: str, fault: Fault, driver: str = "", guided: b
             return "not begun"
         assert bool(person.outcomes) or outcome.error is None, "the person is asked"
         if outcome.error is None:
-            _require_right(record, outcome, undisturbed(procedure, guarded, driver), driver in FREE_RUNNING)
+            _require_right(record, outcome, undisturbed(procedure, guarded, driver), digital, lying)
             return "complete"
         _require_safe(outcome, role, fault, aftermath, driver)
+        hot = role == "oven" and fault.what in ("runaway", "stale")
+        if hot:
+            _require_true_temperatures(record, outcome, fault)
+            _cool(record, outcome.run.run)
         done = resume(record, outcome.run.run, Onlooker(), bench_for(guarded, driver))
         assert (done.run.state, done.error) == ("complete", None)
         if procedure in STRETCHES:
             return "stopped"
-        if (role, fault.what) == ("oven", "runaway"):  # what was kept before it was noticed is hotter, and says so
+        if hot:  # what was kept before a runaway was noticed is hotter, and says so
             assert [kept.pose for kept in included(record, done.run.run)] == [
                 kept.pose for kept in undisturbed(procedure, driver=driver)[1]
             ]
             return "stopped"
-        if (
-            fault.what in OTHER_NOISE or driver in FREE_RUNNING or (role, fault.what) == ("level", "lies")
-        ):  # what the level said is read again
-            _require_right(record, done, undisturbed(procedure, guarded, driver), driver in FREE_RUNNING)
+        later = fault.what in OTHER_NOISE or (fault.what == "flipped-bit" and _is_resent(role, driver))
+        if later or digital or (role == "level" and fault.what in WRONG_LEVEL):
+            _require_right(record, done, undisturbed(procedure, guarded, driver), digital, lying)
         else:
             assert digest(record, done.run.run) == undisturbed(procedure, guarded, driver)[0], (
                 "goes on as if nothing had been"
@@ -129,20 +139,64 @@ def endured(procedure: str, role: str, fault: Fault, driver: str = "", guided: b
     return "stopped"
 
 
+def _is_resent(role: str, driver: str = "") -> bool:
+    """Whether the link sends a damaged message again: it arrives later."""
+    twin = importlib.import_module(f"drivers.{driver or BENCH.instruments[role].driver}.twin")
+    return bool(twin.LISTEN.startswith("tcp:"))
+
+
+def _require_true_temperatures(record: Record, outcome: Outcome, fault: Fault) -> None:
+    """No pose counts whose temperature was read from a stuck thermometer."""
+    if fault.what == "stale":
+        late = [k.pose for k in included(record, outcome.run.run) if k.samples.start_s > fault.at_s + NOW_AND_THEN_S]
+        assert not late, "a temperature of a stuck thermometer"
+
+
+def _cool(record: Record, run: str) -> None:
+    """Wait with the oven off, as the message of the limit says.
+
+    A resumed run of the simulation begins at its last pose, as if no time had passed since.
+    """
+    state = record.state(run)
+    assert state
+    with connect_all(BENCH) as rig:
+        rig.restore(state["rig"])
+        rig.stop()
+        rig.clock.sleep(COOLING_S)
+        record.keep_state(run, state | {"rig": rig.state()})
+
+
 def _require_right(
-    record: Record, outcome: Outcome, expected: tuple[Any, list[KeptPose], list[Reading], float], digital: bool
+    record: Record,
+    outcome: Outcome,
+    expected: tuple[Any, list[KeptPose], list[Reading], float],
+    digital: bool,
+    lying: bool,
 ) -> None:
-    """A run that noticed nothing has measured what an undisturbed one does, or a result of it says so."""
+    """A run that noticed nothing has measured what an undisturbed one does, or a result of it says so.
+
+    `lying`: the level has a constant error. The half turn removes it, so the tilts are compared.
+    """
     assert outcome.run.state == "complete"
     _, sound, readings, _ = expected
     kept = included(record, outcome.run.run)
     assert [each.pose for each in kept] == [each.pose for each in sound]
     wrong = not all(_is_near(one.dwell, other.dwell, digital) for one, other in zip(kept, sound, strict=True))
-    found = {reading.name: reading.value for reading in record.readings(outcome.run.run)}
-    same = (reading for reading in readings if reading.unit in NEAR)  # not counts of lost samples
-    wrong = wrong or any(abs(found[reading.name] - reading.value) > NEAR[reading.unit] for reading in same)
+    found, right = (_tilts(each) if lying else each for each in (record.readings(outcome.run.run), readings))
+    values = {reading.name: reading.value for reading in found}
+    same = (reading for reading in right if reading.unit in NEAR)  # not counts of lost samples
+    wrong = wrong or any(abs(values[reading.name] - reading.value) > NEAR[reading.unit] for reading in same)
     marked = any(result["verdict"] == "fail" for result in outcome.run.results.values()) or outcome.run.message
     assert not wrong or marked, "a wrong number without a mark"
+
+
+def _tilts(readings: list[Reading]) -> list[Reading]:
+    """The readings; instead of those of the level at the front and at the back, the tilt from both."""
+    values = {reading.name: reading.value for reading in readings}
+    fronts = [name for name in values if name.startswith("level-front-")]
+    backs = {name: name.replace("front", "back") for name in fronts}
+    tilts = [Reading(name, reversal(values[name], values[backs[name]])[0], "deg") for name in fronts]
+    return tilts + [reading for reading in readings if reading.name not in {*backs, *backs.values()}]
 
 
 def _is_near(one: Dwell, other: Dwell, digital: bool) -> bool:

@@ -90,6 +90,35 @@ def test_a_turn_is_resumed_with_a_tracker_that_needs_a_second_to_begin() -> None
     assert endured("rate-turn", "adc", Fault("garbage", at_s=70.478), "xsens_mti") == "stopped"
 
 
+def test_a_level_with_a_constant_error_gives_the_right_tilt_when_it_is_read_again() -> None:
+    """The error begins between both readings and stops the run. The person resumes; the half turn removes the error."""
+    assert endured("noise-floor", "level", Fault("lies", at_s=11.773), guided=True) == "complete"
+
+
+@pytest.mark.slow
+def test_a_run_is_resumed_when_a_sensor_that_was_too_hot_has_cooled() -> None:
+    """Its last pose is at 83.4 C of 85 C: without the wait the temperature exceeds the limit again."""
+    assert endured("temperature-cycle", "oven", Fault("runaway", at_s=663.845), guided=True) == "stopped"
+
+
+def test_an_oven_that_restarts_in_a_soak_is_soaked_again_before_the_first_pose() -> None:
+    assert endured("temperature-cycle", "oven", Fault("restart", at_s=686.367)) == "complete"
+
+
+def test_poses_since_the_thermometer_stuck_are_measured_again() -> None:
+    """It sticks at 37.4 C, close enough to the set point 40 C; the approach to 50 C shows it eight poses later."""
+    assert endured("temperature-cycle", "oven", Fault("stale", at_s=195.393), guided=True) == "stopped"
+
+
+def test_a_level_that_repeats_its_last_reading_adds_little_to_the_mean_before() -> None:
+    assert endured("level-check", "level", Fault("stale", at_s=3.271)) == "stopped"
+
+
+def test_a_converter_whose_segments_are_sent_again_measures_later() -> None:
+    """The fault delays the end of the first record by 0.4 s: the poses after it have other noise."""
+    assert endured("rate-turn", "adc", Fault("flipped-bit", at_s=21.983)) == "stopped"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("procedure", "role", "what"), GUIDED)
 def test_a_guided_run_asks_when_all_is_at_rest(procedure: str, role: str, what: str) -> None:
