@@ -154,7 +154,7 @@ def _without_idle_additions(
     decides: what was added before its steps may have followed them, and no linearised test is valid. A cause is not
     left out while the curve of its place stays, which describes it.
     """
-    base, end = fits[0], fits[-1]
+    base = fits[0]
     remaining = {
         addition.effect.name: after.pooled_excess / before.pooled_excess if before.pooled_excess > 0 else 1.0
         for addition, (before, after) in zip(selected, pairwise(fits), strict=True)
@@ -165,31 +165,31 @@ def _without_idle_additions(
     idle = [a for a in reversed(selected) if remaining.get(a.effect.name, 0.0) >= IDLE]
     idle.sort(key=lambda a: remaining[a.effect.name], reverse=True)
     described = [a for a in selected if a.effect.name in insignificant and a not in idle]
-    kept, without = selected, end
+    kept, without = _without_raising_forms(base, selected, fits)
+    least = without.held_out_excess
     for left_out in (idle, *([addition] for addition in idle if len(idle) > 1), *([cause] for cause in described)):
         fewer = [a for a in kept if a not in left_out]
         if not fewer or len(fewer) == len(kept) or _described_by_curves(left_out, fewer):
             continue
         alternative = fit_together(base, fewer)
-        if alternative.held_out_excess <= NO_WORSE * end.held_out_excess:
-            kept, without = fewer, alternative
-    for form in _forms_that_raise_the_unseen_error(selected, fits):
-        fewer = [a for a in kept if a is not form]
-        if not fewer or len(fewer) == len(kept):
-            continue
-        alternative = fit_together(base, fewer)
-        if NO_WORSE * alternative.held_out_excess < without.held_out_excess:
+        if alternative.held_out_excess <= NO_WORSE * least:
             kept, without = fewer, alternative
     if len(kept) == len(selected):
         return selected, fits
     return kept, [base, *fit_successively(base, without, kept)]
 
 
-def _forms_that_raise_the_unseen_error(selected: list[Addition], fits: list[Fit]) -> list[Addition]:
-    """The free forms with which unseen poses are foreseen worse than before them, the last one first."""
-    steps = zip(selected, pairwise(fits), strict=True)
-    raising = [a for a, (before, after) in steps if after.held_out_excess > before.held_out_excess]
-    return [a for a in reversed(raising) if a.effect.name.startswith(PREFIX)]
+def _without_raising_forms(base: Fit, selected: list[Addition], fits: list[Fit]) -> tuple[list[Addition], Fit]:
+    """The additions without the free forms with which unseen poses are foreseen worse than without, and their fit."""
+    kept, end = selected, fits[-1]
+    for form, (before, after) in reversed(list(zip(selected, pairwise(fits), strict=True))):
+        if len(kept) == 1 or after.held_out_excess <= before.held_out_excess or not form.effect.name.startswith(PREFIX):
+            continue
+        fewer = [a for a in kept if a is not form]
+        alternative = fit_together(base, fewer)
+        if NO_WORSE * alternative.held_out_excess < end.held_out_excess:
+            kept, end = fewer, alternative
+    return kept, end
 
 
 def _described_by_curves(left_out: Sequence[Addition], kept: Sequence[Addition]) -> bool:
