@@ -106,10 +106,9 @@ def _begin(setting: Setting, general: bool, loops: bool, jumps: bool) -> Point:
         for c in all_components(data, state, setting.flicker)
         if (general or not c.general) and (loops or not c.has_loops) and not (jumps and is_off_centre(c))
     ]
-    saw = find_saw(data, state, setting.white, data.outputs - state.predicted, (), ENTER)
     steps = setting.first_jumps if jumps else None
     slow = {c.name: (SLOW_BEGIN * setting.floor) ** 2 for c in components if c.noise}
-    return Point([*components, *([saw] if saw else []), *([steps] if steps else [])], slow, values, state)
+    return Point([*components, *([steps] if steps else [])], slow, values, state)
 
 
 def _advance(setting: Setting, progress: _Progress, number: int, catalogue_first: bool) -> _Progress:
@@ -140,12 +139,12 @@ def _advance(setting: Setting, progress: _Progress, number: int, catalogue_first
     if setting.misfit(moved.state) > 1.5 * g.squares / g.rows + 10.0:  # components against each other: no step
         return _after_failure(progress, moved)
     progress = replace(progress, point=moved)
-    if not any(c.cause == "quantisation" for c in moved.components):
+    is_same = set(moved.variances) == set(point.variances)
+    if is_same and not any(c.cause == "quantisation" for c in moved.components):
         residual = setting.data.outputs - moved.state.predicted
         saw = find_saw(setting.data, moved.state, setting.white, residual, progress.rejected, ENTER)
         if saw is not None:
             return replace(progress, point=replace(moved, components=[*moved.components, saw]))
-    is_same = set(moved.variances) == set(point.variances)
     return replace(progress, converged=not is_coarse and is_same and progress.change < CONVERGED)
 
 

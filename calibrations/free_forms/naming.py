@@ -9,6 +9,7 @@ from scipy.special import betaincc  # scipy.stats takes 0.4 s to load
 
 from calibrations.criteria import SIGNIFICANT
 from calibrations.free_forms.components import Component
+from calibrations.free_forms.places import is_off_centre
 from calibrations.free_forms.places_in_time import DRIFT_LINE, LONGEST_PART
 from calibrations.free_forms.search_result import SearchResult
 from calibrations.free_forms.shapes import climb
@@ -292,7 +293,8 @@ def _necessary(columns: Mapping[str, Array], curve: Array, total: float) -> tupl
 def _follows_many(comp: Component) -> bool:
     """Whether a cause's columns are of many widths, so that they explain a part of most curves."""
     flexible_kinds = ("clips", "play", "preisach")
-    return comp.cause == "quantisation" or (comp.form is not None and comp.form.basis(0).kind in flexible_kinds)
+    is_flexible = comp.form is not None and comp.form.basis(0).kind in flexible_kinds
+    return comp.cause == "quantisation" or is_flexible or is_off_centre(comp)
 
 
 def _is_no_walk(result: SearchResult, name: str) -> bool:

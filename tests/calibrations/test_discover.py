@@ -77,9 +77,10 @@ def test_a_small_correction_of_the_form_is_a_refinement(cubic: float, causes: in
 
 @pytest.mark.slow
 def test_an_effect_that_later_ones_make_needless_is_dropped() -> None:
+    """The effects have opposite signs on the two axes, which no one function of the output describes."""
     columns = turns(step_deg=30.0)
     x, y, _ = components(columns)
-    found = discover(poses(columns, 2.5 + x + 1.5e-3 * (y**2 + abs(x)), 2.5 + y + 1.5e-3 * (x**2 + abs(y))), LINEAR)
+    found = discover(poses(columns, 2.5 + x + 1.5e-3 * (y**2 + abs(x)), 2.5 + y - 1.5e-3 * (x**2 + abs(y))), LINEAR)
     assert sorted(names(found)) == ["cross-axis-bias", "scale-factor-asymmetry"]
     first = find_path(found.start, (), catalogue()).steps
     assert len(first) > 2  # another was taken first, which explained a part of both

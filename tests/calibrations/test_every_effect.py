@@ -33,7 +33,7 @@ def table_for(effect: Effect, kind: str) -> Table:
         spread = np.linspace(1e-3, 5e-3, len(a))  # with vibration that changes
         return Table.from_columns("poses", {**made.columns, "vx_std_v": spread, "vy_std_v": spread}, made.constants)
     if kind == "motion":
-        moved = shaken.record(duration_s=4.0, attitudes=((45.0, 60.0), (45.0, 90.0)))
+        moved = shaken.record(duration_s=4.0, attitudes=((45.0, 60.0),))
         needed = {name: np.linspace(4.9, 5.1, moved.n) for name in effect.needs if name not in moved}
         return Table.from_columns("motion", {**moved.columns, **needed}, moved.constants)
     if kind == "rates":

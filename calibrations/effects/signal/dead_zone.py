@@ -1,9 +1,7 @@
 import numpy as np
 
-from calibrations.effects import Effect, Parameter, Values
+from calibrations.effects import Constant, Effect, Parameter, Values
 from calibrations.table import Array, Table
-
-ZERO_G = 0.05  # standard deviation of the sensor's own zero: without poses in the zone, its middle is not known
 
 
 class DeadZone(Effect):
@@ -21,12 +19,11 @@ class DeadZone(Effect):
 
     width = Parameter("g", typical=0.01, starts=(0.003, 0.05), low=0.0, high=0.5, doc="greatest without output")
     centre = Parameter(
-        "g",
-        typical=0.01,
-        prior=dict.fromkeys("xyz", ZERO_G),
-        assumed=0.0,
+        "g", typical=0.01, low=-0.5, high=0.5, where="centred", assumed=0.0,
         doc="force at the middle of it; only poses in the zone show it",
-    )
+    )  # fmt: skip
+    # In a motion at few attitudes, a zone about any force would be an offset at one of them.
+    centred = Constant(lambda table: float(table.kind == "poses"), doc="the middle is sought (1: yes, 0: it is 0 g)")
 
     def force(self, a: Array, table: Table, p: Values) -> Array:
         return a - np.clip(a - p.centre, -p.width, p.width)
