@@ -5,6 +5,7 @@ Logs here become tables of means: the search for still positions, dwells and tur
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -92,6 +93,9 @@ def own_procedure(data: bytes) -> object:
         return summary(found) if found else None
 
 
+TOKEN_SENT = re.compile(rb"rig-8473\s*=\s*secret")  # spaces about a name belong to no cookie
+
+
 def web_request(data: bytes) -> object:
     """Headers `name: value` in lines after the address: in without the token nobody comes."""
     address, *lines = data.split(b"\n")
@@ -100,7 +104,7 @@ def web_request(data: bytes) -> object:
     sent: list[Any] = []
 
     async def app(scope: Any, receive: Any, send: Any) -> None:
-        assert b"rig-8473=secret" in data
+        assert TOKEN_SENT.search(data)
         await send({"type": "http.response.start", "status": 200, "headers": []})
 
     async def send(message: Any) -> None:
