@@ -56,7 +56,7 @@ ROUNDS = 20  # of a regression in two clusters
 # other rows by their noise.
 APART_ROWS, CLEARLY_APART = 0.5, 3.0
 MOST_SHARED = 3  # rows for each column of the effects that two sensors share: fewer rows would be fitted themselves
-LEAST_REPEATED = 0.25  # pairs of rows of one input, of the rows: of fewer, chance makes most agree
+LEAST_REPEATED = 0.25  # pairs of rows of one force, of the rows: of fewer, chance makes most agree
 CHECK_WIRING = "check the sensor's supply, the cable and the channel of"
 
 
@@ -240,7 +240,7 @@ def _two_groups(table: Table, known_input: Array | None = None) -> Finding | Non
         within_share > LEFT_WITHIN_GROUPS
         or not SMALLER_GROUP <= share <= 1 - SMALLER_GROUP
         or _has_pattern(table, labels)
-        or _follow_input(labels, known_input)
+        or (table.type.stage_angles and _follow_orientation(labels, known_input))
     ):
         return None
     white = white_std(table)
@@ -358,9 +358,9 @@ def _has_pattern(table: Table, labels: NDArray[np.bool_]) -> bool:
     )
 
 
-def _follow_input(labels: NDArray[np.bool_], known_input: Array) -> bool:
-    """Whether rows of one known input (n, 3) are in one group: then an effect made them, and two sensors have both."""
-    same = np.unique(np.round(known_input, 3), axis=0, return_inverse=True)[1].ravel()
+def _follow_orientation(labels: NDArray[np.bool_], force: Array) -> bool:
+    """Whether rows of one specific force (n, 3) are in one group: an effect made them, and two sensors have both."""
+    same = np.unique(np.round(force, 3), axis=0, return_inverse=True)[1].ravel()
     rows, second = np.bincount(same), np.bincount(same, labels)
     pairs = float(np.sum(rows * (rows - 1))) / 2
     if pairs < len(labels) * LEAST_REPEATED:
