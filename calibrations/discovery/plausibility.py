@@ -44,7 +44,6 @@ from calibrations.criteria import (
 from calibrations.discovery.readings import Response, geometry_finding, response
 from calibrations.discovery.verdict import Finding, Verdict
 from calibrations.fitting.fit import Fit
-from calibrations.fitting.solution import pose_numbers, repeats_few_poses
 from calibrations.geometry.orientation import reported_force
 from calibrations.geometry.rate_table import turn_axes
 from calibrations.means.noise import rms, white_std
@@ -240,7 +239,6 @@ def _two_groups(table: Table, known_input: Array | None = None) -> Finding | Non
         within_share > LEFT_WITHIN_GROUPS
         or not SMALLER_GROUP <= share <= 1 - SMALLER_GROUP
         or _has_pattern(table, labels)
-        or (table.type.stage_angles and _follow_orientation(labels, known_input))
     ):
         return None
     white = white_std(table)
@@ -343,11 +341,9 @@ def _has_pattern(table: Table, labels: NDArray[np.bool_]) -> bool:
     along = min(
         _share_of_agreement(labels, *_order_along(beta, alpha)), _share_of_agreement(labels, *_order_along(alpha, beta))
     )
-    if _exceeds_chance(along, by_chance):
+    if _exceeds_chance(along, by_chance) or _follow_orientation(labels, reported_force(table), by_chance):
         return True
     kinds = [table.column(name) for name in ("direction", "flip", "mount_deg") if name in table]
-    if (pose := pose_numbers(table)) is not None and repeats_few_poses(table):
-        kinds.append(pose.astype(float))  # two sensors measure the same poses, so that each pose has both
     return any(
         _exceeds_chance(
             sum(max(labels[values == value].sum(), (~labels[values == value]).sum()) for value in np.unique(values))
@@ -358,7 +354,7 @@ def _has_pattern(table: Table, labels: NDArray[np.bool_]) -> bool:
     )
 
 
-def _follow_orientation(labels: NDArray[np.bool_], force: Array) -> bool:
+def _follow_orientation(labels: NDArray[np.bool_], force: Array, by_chance: float) -> bool:
     """Whether rows of one specific force (n, 3) are in one group: an effect made them, and two sensors have both."""
     same = np.unique(np.round(force, 3), axis=0, return_inverse=True)[1].ravel()
     rows, second = np.bincount(same), np.bincount(same, labels)
@@ -366,8 +362,7 @@ def _follow_orientation(labels: NDArray[np.bool_], force: Array) -> bool:
     if pairs < len(labels) * LEAST_REPEATED:
         return False
     agreeing = float(np.sum(second * (second - 1) + (rows - second) * (rows - second - 1))) / 2
-    share = float(labels.mean())
-    return _exceeds_chance(agreeing / pairs, share**2 + (1 - share) ** 2)
+    return _exceeds_chance(agreeing / pairs, by_chance)
 
 
 def _exceeds_chance(agreement: float, by_chance: float) -> bool:

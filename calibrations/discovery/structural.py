@@ -277,7 +277,9 @@ def _fit_before_stairs(base: Fit, effects: Mapping[str, Effect]) -> tuple[Fit, _
     stairs = find_stairs(base.table, base.table.outputs.T - base.residual, white)
     if stairs is None:
         return base, None, 1.0
-    known, white = white is not None, np.full(base.residual.shape, stairs.noise) if white is None else white
+    known = white is not None
+    if white is None:
+        white = np.full(base.residual.shape, stairs.noise)
     smooth = fit(base.model, before_stairs(base.table, white, stairs))
     places = structure(smooth, effects)
     causes = fit_separately(smooth, places, additions(places, smooth.model, effects))

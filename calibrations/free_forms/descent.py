@@ -24,10 +24,10 @@ from calibrations.free_forms.reml import (
     scale_components,
     without,
 )
+from calibrations.free_forms.saw import find_saw
 from calibrations.free_forms.search_result import MISFIT, Point, SearchResult, Setting, finish
 from calibrations.free_forms.selection import ENTER, pools_of, select
 from calibrations.free_forms.shapes import refine_shapes
-from calibrations.free_forms.stairs import find_saw
 from calibrations.progress import report
 from calibrations.table import Array
 

@@ -16,7 +16,7 @@ from calibrations.free_forms.chain import State
 from calibrations.free_forms.components import GENERAL, Component, free
 from calibrations.free_forms.form import Form
 from calibrations.free_forms.reml import Gram, Sizes
-from calibrations.free_forms.stairs import SAW
+from calibrations.free_forms.saw import SAW
 from calibrations.table import Array
 
 STEPS = "output/steps"

@@ -20,7 +20,7 @@ from calibrations.free_forms.poses import PoseData
 from calibrations.table import Array, Table
 
 SMOOTH = 2 * math.log(2)  # price of the second of two readings of a column
-LEAST_SCATTER = 0.03  # of a level's rms: with less the readings of a column are its level
+LEAST_SCATTER = 0.03  # of the readings' rms: with less the readings of a column are its level
 
 
 def over_output(data: PoseData, first: State) -> list[Component]:

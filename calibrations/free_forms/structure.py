@@ -20,10 +20,11 @@ from calibrations.free_forms.geometry import LINEAR_PART, Geometry, GeometryEffe
 from calibrations.free_forms.naming import is_over_soon, is_unsettled
 from calibrations.free_forms.place_names import HISTORY, place_of_effect
 from calibrations.free_forms.poses import PoseData
+from calibrations.free_forms.saw import SAW
 from calibrations.free_forms.search import search
 from calibrations.free_forms.search_result import SearchResult
 from calibrations.free_forms.selection import ENTER
-from calibrations.free_forms.stairs import SAW, Stairs
+from calibrations.free_forms.stairs import Stairs
 from calibrations.geometry.orientation import out_of_plane
 from calibrations.geometry.smooth import smooth_columns
 from calibrations.means.noise import neighbour_std, neighbours_contradict, robust_std

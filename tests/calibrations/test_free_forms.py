@@ -34,7 +34,7 @@ from calibrations.free_forms.bases import (
 )
 from calibrations.free_forms.effect import FreeForm, check_forms, free_form, place_of
 from calibrations.free_forms.form import Form
-from calibrations.free_forms.stairs import _steps
+from calibrations.free_forms.saw import _steps
 from calibrations.geometry.orientation import nominal_pose, specific_force
 from calibrations.loop import dataset
 from calibrations.model.file import dump_model, parse_model, read_model

@@ -136,7 +136,25 @@ def test_a_dead_zone_about_the_own_zero_of_each_axis_has_its_name(centre: tuple[
         assert found.end.params[f"dead-zone.width.{axis}"].value == pytest.approx(width, abs=1e-3)
 
 
-def test_three_causes_are_found_in_forty_poses() -> None:
+def test_two_slopes_that_meet_at_the_own_zero_are_no_dead_zone() -> None:
+    directions = in_all_directions(300, seed=4)
+    own = forces(directions)[:, :2]
+    found = discover(directions, own + 3e-3 * np.abs(own - [-0.03, 0.025]))
+    assert found.causes == ("scale-factor-asymmetry",)
+    assert found.end.held_out_excess < 1.15
+
+
+def test_an_eccentric_stage_has_its_name_where_beta_stops_at_eight_headings() -> None:
+    alpha, beta = (angle.ravel() for angle in np.meshgrid([45.0, 90.0, 135.0], np.arange(8) * 45.0, indexing="ij"))
+    columns = {"alpha_deg": np.tile(alpha, 8), "beta_deg": np.tile(beta, 8), "direction": np.ones(8 * alpha.size)}
+    columns["t_s"] = 9.0 * np.arange(8 * alpha.size) + 50.0
+    turned = np.radians(columns["beta_deg"])
+    found = discover(columns, forces(columns, 0.0, 0.1 * np.sin(turned + 0.6) + 0.02 * np.cos(2 * turned))[:, :2])
+    assert found.causes == ("stage-eccentricity",)
+    assert found.end.held_out_excess < 1.15
+
+
+def test_two_causes_are_found_in_forty_poses() -> None:
     directions = in_all_directions(40, seed=6)
     x, y, z = forces(directions).T
     added = np.column_stack([2e-3 * z**2 + 2e-3 * x * np.abs(x), -1.5e-3 * z**2 + 3e-3 * y * np.abs(y)])

@@ -72,6 +72,21 @@ def test_an_insignificant_cause_is_left_out_where_a_later_one_describes_its_part
         assert [a.effect.name for a in kept] == names
 
 
+def test_a_curve_is_left_out_without_which_unseen_poses_are_foreseen_better(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And it is left out first: with it, a saturation would not seem to lower the unseen error."""
+    added = [addition("quantisation"), addition("saturation"), Addition(free_form((CURVE,)))]
+    held_out = (9.0, 4.0, 2.0, 4.0)
+    fits = [SimpleNamespace(pooled_excess=1.0, held_out_excess=e) for e in held_out]
+
+    def together(base: object, additions: list[Addition]) -> SimpleNamespace:
+        error = 4.0 if added[2] in additions or added[1] not in additions else 2.0
+        return SimpleNamespace(pooled_excess=1.0, held_out_excess=error)
+
+    monkeypatch.setattr(structural, "fit_together", together)
+    monkeypatch.setattr(structural, "fit_successively", lambda base, end, additions: [end for _ in additions])
+    assert structural._without_idle_additions(added, fits, [], [])[0] == added[:2]
+
+
 def test_beside_steps_a_cause_stays_while_the_curve_of_its_place_does(monkeypatch: pytest.MonkeyPatch) -> None:
     added = [addition("quadratic-nonlinearity"), addition("quantisation"), Addition(free_form((CURVE,)))]
     fits = [SimpleNamespace(pooled_excess=e, held_out_excess=e) for e in (9.0, 3.0, 2.0, 1.0)]

@@ -10,12 +10,11 @@ import pytest
 from scipy.stats import norm
 
 import calibrations as cal
+from calibrations.free_forms.saw import SAW_REJECTIONS, find_saw
 from calibrations.free_forms.stairs import (
-    SAW_REJECTIONS,
     Stairs,
     _step_of_means,
     before_stairs,
-    find_saw,
     find_stairs,
     fit_stairs,
     noise_before_rounding,
