@@ -52,11 +52,12 @@ class Parameter:
 
     `typical` is the magnitude that a sensor may show (in what is sensed where the unit holds {out}: g, the field's
     strength or deg/s; else in `unit`): the step of numerical derivatives follows from it, and an estimate with a larger
-    uncertainty is not identified. A fit starts from `starts`, or from `guess`: a function of the table that gives
-    (axes,) or (starts, axes). `measured` names an axis without which the parameter does not exist, `where` a constant
-    of the effect that is 0 where it does not (for one axis, with the axis behind it: `turned_x`), and `scale` a
-    constant that `typical` is a multiple of, where only data can tell. `prior` holds the standard deviation of a
-    Gaussian prior of mean 0 by axis ("" for one value of all axes); an axis without one does not have the parameter.
+    uncertainty is not identified. An estimate lies between `low` and `high`, and is at most `most` of the table. A fit
+    starts from `starts`, or from `guess`: a function of the table that gives (axes,) or (starts, axes). `measured`
+    names an axis without which the parameter does not exist, `where` a constant of the effect that is 0 where it does
+    not (for one axis, with the axis behind it: `turned_x`), and `scale` a constant that `typical` is a multiple of,
+    where only data can tell. `prior` holds the standard deviation of a Gaussian prior of mean 0 by axis ("" for one
+    value of all axes); an axis without one does not have the parameter.
     `assumed` is the value in model files that do not give one, as they were written before there was the parameter.
     An effect's class sets `name`.
     """
@@ -67,6 +68,7 @@ class Parameter:
     starts: tuple[float, ...] = (0.0,)
     low: float = -np.inf
     high: float = np.inf
+    most: Callable[[Table], float] | None = None
     guess: Callable[[Any], Array] | None = None  # of a table; of a noise effect: of a channel
     measured: str = ""
     where: str = ""

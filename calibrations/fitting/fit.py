@@ -119,7 +119,9 @@ def refit(before: Fit, model: Model, start: Array | None = None) -> Fit:
 
         model = with_sizes(model, before)
     problem = make_problem(model, before.table)
-    return _alternate(problem, before.in_white_noise().noise, problem.layout.starts() if start is None else [start])
+    # a start may be a linear step away from values that have bounds
+    starts = problem.layout.starts() if start is None else [np.clip(start, *problem.layout.bounds)]
+    return _alternate(problem, before.in_white_noise().noise, starts)
 
 
 def _alternate(problem: Problem, noise: Noise, starts: list[Array]) -> Fit:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import product
 
@@ -188,7 +188,8 @@ def _exists(constant: str, term: Term) -> bool:
 
 def _slots(i: int, term: Term, table: Table) -> list[Slot]:
     slots = []
-    for p in term.effect.parameters:
+    for declared in term.effect.parameters:
+        p = replace(declared, high=min(declared.high, declared.most(table))) if declared.most else declared
         if (p.measured and p.measured not in table.axes) or not _exists(p.where, term):
             continue
         axes = table.axes if p.per_axis and not term.tied else ("",)

@@ -96,6 +96,15 @@ def test_the_noise_of_the_fit_before_has_no_influence_on_a_refit() -> None:
     np.testing.assert_array_equal(refit(replace(before, noise=noise), MODEL).theta, refit(before, MODEL).theta)
 
 
+def test_a_refit_begins_within_the_bounds_where_the_given_start_is_outside() -> None:
+    """A start may be a linear step away, to a negative width or a time constant below zero."""
+    before, model = fit(MODEL, table(3)), MODEL.with_effect(catalogue()["dead-zone"])
+    low = Layout.of(model, before.table).bounds[0]
+    start = np.array([*before.theta, *[-1.0] * (len(low) - len(before.theta))])
+    assert np.any(start < low)
+    assert np.all(refit(before, model, start).theta >= low)
+
+
 def test_order_of_rows_does_not_matter() -> None:
     data = table(3)
     shuffled = data.rows(np.random.default_rng(0).permutation(data.n))

@@ -76,6 +76,6 @@ def test_a_non_orthogonality_has_its_name_beside_a_smaller_scale_factor_over_the
 def test_a_non_orthogonality_has_its_name_beside_a_far_smaller_square_of_the_other_axis() -> None:
     """Only about a zero of more than 0.7 g would the square have such a line."""
     force = forces()
-    leaning = force[:, :2] - np.radians(0.06) * np.column_stack([0 * force[:, 0], force[:, 0]])
+    leaning = force[:, :2] - np.radians(0.04) * np.column_stack([0 * force[:, 0], force[:, 0]])
     found = discover(leaning, 4e-4 * force[:, [1, 0]] ** 2)
     assert set(found.causes) == {"cross-axis-bias", "axis-nonorthogonality"}

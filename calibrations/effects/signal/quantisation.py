@@ -14,6 +14,7 @@ MOST = 20_000  # frequencies
 CODES = 3  # to either side of the nearest one, that noise may reach
 UNREACHED = 9.0  # standard deviations of the noise: codes beyond have a share below rounding
 TOGETHER = 64  # frequencies of one block
+MOST_NOISE = 1.5  # of the scatter of the samples: the poses may lie where codes are seldom changed
 VISIBLE = 0.6  # of a step: more noise leaves a thousandth of the saw
 
 
@@ -52,6 +53,7 @@ class Quantisation(Effect):
         "{out}",
         typical=1e-3,
         low=0.0,
+        most=lambda table: MOST_NOISE * _scatter(table),
         guess=lambda table: _start(table, 2),
         doc="of a sample, before it is rounded",
     )
@@ -91,6 +93,17 @@ def _frequencies(table: Table) -> Array:
     noise = float(np.median(table.optional(table.std_names[0], 0.0)))
     most = min(VISIBLE / noise if noise > 0 else np.inf, MOST / FINEST / span)
     return np.arange(3 / span, most, 1 / (FINEST * span))
+
+
+def _scatter(table: Table) -> float:
+    """Standard deviation of a sample of the noisiest output, {out}; inf where the table does not say.
+
+    On average over all values, rounded samples scatter more than they did before.
+    """
+    if not all(name in table for name in (*table.std_names, "n")) or np.all(table.column("n") < 2):
+        return np.inf
+    squares = [np.mean(table.column(name) ** 2) for name in table.std_names]
+    return float(np.sqrt(max(squares)))
 
 
 def _start(table: Table, k: int) -> Array:
