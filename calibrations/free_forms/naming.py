@@ -110,7 +110,7 @@ def _name_effects(
     walks = {result.component(name).cause for name in names if "/walk-" in name}
     first = [cause for cause in acting_causes if cause and cause not in walks] if walks else []  # walks follow anything
     chosen_causes, share = _select_causes(tuple(columns), acting_causes, first, curve, options_of)
-    if chosen_causes == ("warm-up-bias",) and DRIFT_LINE in names:
+    if chosen_causes == ("warm-up-bias",) and DRIFT_LINE in names and "bias-drift" in forms:
         drift, share_of_drift = _select_causes(["bias-drift"], acting_causes, (), curve, options_of)
         if drift and 1 - share_of_drift < CLEARLY_LESS**2 * (1 - share):
             chosen_causes, share = drift, share_of_drift

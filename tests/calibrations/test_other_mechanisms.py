@@ -10,7 +10,7 @@ import pytest
 from calibrations.discovery.results import Discovery
 from calibrations.effects.catalogue import catalogue
 from calibrations.fitting.fit import Fit
-from calibrations.free_forms.acting_places import places
+from calibrations.free_forms.acting_places import ActingPlace, places
 from calibrations.free_forms.chain import ModelEffects, start
 from calibrations.free_forms.places import components
 from calibrations.free_forms.poses import PoseData
@@ -92,21 +92,33 @@ def test_a_misalignment_beside_an_out_of_plane_gap_keeps_its_name() -> None:
     assert {"axis-misalignment", "stage-zero-offset"} & set(found.causes)
 
 
-def test_a_warm_up_with_two_time_constants_is_one_cause() -> None:
-    """The effect acts at the shorter one, beside a curve with the longer one: its name needs most of both together."""
-    t = (TURN["t_s"] - TURN["t_s"][0]) / DURATION_S
-    warming = 8e-3 * (0.5 * np.exp(-t / 0.03) + 0.5 * np.exp(-t / 0.3))
-    outputs = 2.5 + forces(TURN)[:, :2] * (1 + warming[:, None] * [1.0, -0.8])
+def acting_places(outputs: Array, names: tuple[str, ...]) -> list[ActingPlace]:
+    """The places where these components of a search act, at outputs of TURN, V, (n, 2)."""
     data = PoseData.of(synthetic.poses(TURN, *outputs.T))
     given = ModelEffects.without_effects(data)
     setting = Setting(data, np.full((2, data.n), synthetic.NOISE_V), given)
     values = start(data, given)
     state = setting.state_at(values, ())
-    acting = dict.fromkeys(("time-scale/curve", "time-scale/warm-up-scale@0.040"), 1e-4)
-    found = finish(setting, Point(components(data, state), acting, values, state), {}, {})
-    (place,) = places(found)
+    return places(finish(setting, Point(components(data, state), dict.fromkeys(names, 1e-4), values, state), {}, {}))
+
+
+def test_a_warm_up_with_two_time_constants_is_one_cause() -> None:
+    """The effect acts at the shorter one, beside a curve with the longer one: its name needs most of both together."""
+    t = (TURN["t_s"] - TURN["t_s"][0]) / DURATION_S
+    warming = 8e-3 * (0.5 * np.exp(-t / 0.03) + 0.5 * np.exp(-t / 0.3))
+    outputs = 2.5 + forces(TURN)[:, :2] * (1 + warming[:, None] * [1.0, -0.8])
+    (place,) = acting_places(outputs, ("time-scale/curve", "time-scale/warm-up-scale@0.040"))
     assert place.causes == ("warm-up-scale",)
     assert place.share > 0.9
+
+
+def test_a_warm_up_with_a_jump_has_its_name_beside_a_line_in_time() -> None:
+    """A curve that jumps is no drift, so that none competes for the name."""
+    t = (TURN["t_s"] - TURN["t_s"][0]) / DURATION_S
+    bias = 8e-3 * np.exp(-t / 0.3) + 1e-3 * (t > 0.5)
+    names = ("time-bias/line", "time-bias/walk-x", "time-bias/walk-y", "time-bias/warm-up-bias@0.150")
+    (place,) = acting_places(2.5 + forces(TURN)[:, :2] + bias[:, None] * [1.0, -0.8], names)
+    assert place.causes == ("warm-up-bias",)
 
 
 @pytest.mark.slow
