@@ -103,10 +103,12 @@ def _odd_quadratic(columns: Columns, a: Array) -> Array:
     return linear(a) + np.array([0.003 * np.sign(a[0]) * a[0] ** 2, -0.002 * np.sign(a[1]) * a[1] ** 2])
 
 
-@made("scale-factor-asymmetry", kink__x=0.003, kink__y=-0.001)
+@made("scale-factor-asymmetry", kink__x=0.003, kink__y=-0.005, centre__x=0.03, centre__y=-0.02)
 def _asymmetry(columns: Columns, a: Array) -> Array:
-    slopes = K + np.array([0.003, -0.001]), K - np.array([0.003, -0.001])  # where a > 0, where a < 0
-    return np.where(a[:2] > 0, slopes[0][:, None], slopes[1][:, None]) * a[:2] + B[:, None]
+    kink, centre = np.array([0.003, -0.005]), np.array([0.03, -0.02])
+    from_centre = a[:2] - centre[:, None]
+    slopes = (K + kink)[:, None], (K - kink)[:, None]  # above the centre, below it
+    return np.where(from_centre > 0, *slopes) * from_centre + (B + K * centre)[:, None]
 
 
 @made("cross-axis-scale", slope__x=0.003, slope__y=0.004)
