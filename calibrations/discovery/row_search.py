@@ -165,6 +165,9 @@ class RowSearch:
         from calibrations.discovery.structural import search_structure  # only this search needs it
 
         structural = search_structure(start, effects, path.ranked if start.noise.known else ())
+        if structural.end.held_out_excess > MATERIAL:
+            report("adding effects of the catalogue one after another")
+            path = continue_path(path, effects)
         if structural.steps and path.steps and _cross_validated(path.end) <= _cross_validated(structural.end):
             return self._path_findings(path, effects, origin)  # the larger model must predict better
         origin = structural.start if origin is start else origin.in_floor(structural.end.noise.floor)

@@ -41,7 +41,7 @@ from calibrations.fitting.fit import Fit, fit, with_least_white
 from calibrations.fitting.problem_kinds import make_problem
 from calibrations.fitting.requested_forms import BASE, effects_beyond_base
 from calibrations.free_forms.geometry import GEOMETRY, GeometryEffects
-from calibrations.free_forms.place_names import PREFIX, place_of_effect
+from calibrations.free_forms.place_names import PREFIX, PRODUCTS, place_of_effect
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.search import search
 from calibrations.free_forms.stairs import (
@@ -121,11 +121,15 @@ def _fit_each_addition(base: Fit, best: _StructureFit, renew: bool) -> tuple[lis
     selected = [*causes, *at_values_of(end, best.forms)]
     if renew:
         end = fit_together(base, selected)
-    selected, fits = fit_one_by_one(base, selected, end)
-    curves = {a.effect.name.removeprefix(PREFIX) for a in best.forms}
-    with_curve = [place.causes for place in best.structure.places if place.name in curves]
-    needed = needed_causes(with_curve, significant_causes(fits[-1], best.structure.causes))
-    return _without_idle_additions(selected, fits, needed, set(best.structure.causes) - needed)
+    present, fits = _without_raising_forms(*fit_one_by_one(base, selected, end))
+    while True:  # beside a curve that is left out, a cause may have been significant that now is not
+        curves = {a.effect.name.removeprefix(PREFIX) for a in present if a.effect.name.startswith(PREFIX)}
+        with_curve = [place.causes for place in best.structure.places if place.name in curves]
+        needed = needed_causes(with_curve, significant_causes(fits[-1], best.structure.causes))
+        fewer, fits = _without_idle_additions(present, fits, needed, set(best.structure.causes) - needed)
+        if len(fewer) == len(present):
+            return present, fits
+        present = fewer
 
 
 def needed_causes(with_curve: Sequence[Sequence[str]], significant: set[str]) -> set[str]:
@@ -165,7 +169,7 @@ def _without_idle_additions(
     idle = [a for a in reversed(selected) if remaining.get(a.effect.name, 0.0) >= IDLE]
     idle.sort(key=lambda a: remaining[a.effect.name], reverse=True)
     described = [a for a in selected if a.effect.name in insignificant and a not in idle]
-    kept, without = _without_raising_forms(base, selected, fits)
+    kept, without = selected, fits[-1]
     least = without.held_out_excess
     for left_out in (idle, *([addition] for addition in idle if len(idle) > 1), *([cause] for cause in described)):
         fewer = [a for a in kept if a not in left_out]
@@ -179,9 +183,9 @@ def _without_idle_additions(
     return kept, [base, *fit_successively(base, without, kept)]
 
 
-def _without_raising_forms(base: Fit, selected: list[Addition], fits: list[Fit]) -> tuple[list[Addition], Fit]:
-    """The additions without the free forms with which unseen poses are foreseen worse than without, and their fit."""
-    kept, end = selected, fits[-1]
+def _without_raising_forms(selected: list[Addition], fits: list[Fit]) -> tuple[list[Addition], list[Fit]]:
+    """The additions without the free forms with which unseen poses are foreseen worse than without, and their fits."""
+    base, kept, end = fits[0], selected, fits[-1]
     for form, (before, after) in reversed(list(zip(selected, pairwise(fits), strict=True))):
         if len(kept) == 1 or after.held_out_excess <= before.held_out_excess or not form.effect.name.startswith(PREFIX):
             continue
@@ -189,13 +193,14 @@ def _without_raising_forms(base: Fit, selected: list[Addition], fits: list[Fit])
         alternative = fit_together(base, fewer)
         if NO_WORSE * alternative.held_out_excess < end.held_out_excess:
             kept, end = fewer, alternative
-    return kept, end
+    return (selected, fits) if kept is selected else (kept, [base, *fit_successively(base, end, kept)])
 
 
 def _described_by_curves(left_out: Sequence[Addition], kept: Sequence[Addition]) -> bool:
-    """Whether the curve of its place describes each effect that is left out."""
-    curves = {a.effect.name for a in kept}
-    return all(f"{PREFIX}{place_of_effect(a.effect.name)}" in curves for a in left_out)
+    """Whether the curve of its place, or of products of forces, describes each effect that is left out."""
+    described = {a.effect.name.removeprefix(PREFIX) for a in kept}
+    described |= set(PRODUCTS) if "force" in described else set()
+    return all(place_of_effect(a.effect.name) in described for a in left_out)
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ PLACES = {
 }  # and column:NAME, a logged column
 KINDS_OF_FORMS = ("poses", "positions", "motion")  # of data, that can show a free form
 HISTORY = "history"
+PRODUCTS = ("scale-over-cross", "scale-over-z")  # places whose effects the curve of the place "force" describes too
 GEOMETRY_PLACE = "geometry"  # a matrix and two angles: no free form, but a search can leave it out
 AT_REST = ("temperature-bias", "time-bias")  # and column:NAME: what one orientation shows
 EFFECTS_AT = {

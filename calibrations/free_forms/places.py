@@ -40,7 +40,7 @@ LOOP_INTERVALS = 8
 DEAD_G = (0.003, 0.012, 0.05)
 THRESHOLDS_G = tuple(np.geomspace(0.002, 0.2, 8).tolist())  # of dead zones that are not all of one width
 OFF_CENTRE_G = 0.02  # a sensor's own zero, about which its dead zone may lie
-KNEE_G = 0.005  # width of the bend where the search for it starts
+KNEES_G = (0.005, 0.03)  # widths of the bend where the search for it starts
 ENDS = (0.75, 0.9, 0.97, 0.99)  # of an axis's range, where saturation begins
 DEGREE = 4  # of a general function of the force's direction
 FEWEST_ANGLES, FINE_ANGLES = 8, 33  # different angles beta that can show harmonics, and fine ones
@@ -185,25 +185,25 @@ def _clipped(widths: tuple[float, ...], centres: tuple[float, ...]) -> Basis:
 def _saturations(data: PoseData, first: State) -> list[Component]:
     place = "own-response"
     ranges = [(float(f.min() + f.max()) / 2, float(np.ptp(f)) / 2) for f in first.force.T]
-    price = 2 * np.log(3 * len(ENDS))
+    price = 2 * np.log(3 * len(ENDS) * len(KNEES_G))
 
     def make_saturation(name: str, side: int) -> Make:
         return lambda shape: Component(
             name, place, "response", "saturation", f"{place}/saturation", price, _saturation_columns(shape, side),
-            shape=shape, step=(*(0.02,) * (len(shape) - 1), KNEE_G), reshaped=make_saturation(name, side),
+            shape=shape, step=(*(0.02,) * (len(shape) - 1), KNEES_G[0]), reshaped=make_saturation(name, side),
             starts=lambda loss: (*_levels(first, shape, side), ("loss", "", float(np.clip(-loss[0], 0.01, 1.0)))),
         )  # fmt: skip
 
     components = []
     for side, name in ((1, "high"), (-1, "low"), (0, "both")):
-        for end in ENDS:
+        for end, knee in product(ENDS, KNEES_G):
             levels = [(m + end * h, m - end * h) for m, h in ranges[: data.channels]]
             shape = tuple(
                 level
                 for high, low in levels
                 for level in ((high, low) if side == 0 else (high,) if side > 0 else (low,))
             )
-            components.append(make_saturation(f"{place}/saturation@{name}{end}", side)((*shape, KNEE_G)))
+            components.append(make_saturation(f"{place}/saturation@{name}{end},{knee}", side)((*shape, knee)))
     return components
 
 

@@ -17,7 +17,7 @@ from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.search_result import Point, Setting, finish
 from calibrations.loop import dataset
 from calibrations.model.file import read_model
-from calibrations.table import Array
+from calibrations.table import Array, Table
 from tests.calibrations import synthetic
 from tests.slow import slow
 
@@ -162,6 +162,40 @@ def test_two_slopes_about_the_own_zero_leave_no_curve_in_swings_of_the_arm() -> 
     found = discover(columns, own + [-0.03, 0.002] * np.abs(own - [0.012, -0.01]))
     assert found.causes == ("scale-factor-asymmetry",)
     assert found.end.held_out_excess < 1.15
+
+
+@pytest.mark.slow
+def test_a_saturation_that_bends_softly_has_its_name_beside_an_offset_of_the_stage() -> None:
+    """Its bend is six times as wide as that of a hard one; curves of response and output would cancel each other."""
+    directions = in_all_directions(300, seed=4)
+    force = forces(directions, alpha_deg=0.14)
+    output = force - 0.024 * np.sign(force) * np.logaddexp(0, (np.abs(force) - 1.0) / 0.03)
+    noise = synthetic.NOISE_V * np.random.default_rng(0).standard_normal(output.shape)
+    measured = {f"v{axis}_v": values for axis, values in zip("xyz", (2.5 + output + noise).T, strict=True)}
+    known = dict.fromkeys(["vx_std_v", "vy_std_v", "vz_std_v"], np.full(300, synthetic.NOISE_V * np.sqrt(5000.0)))
+    columns = {**directions, **measured, **known, "n": np.full(300, 5000.0)}
+    found = dataset(Table.from_columns("poses", columns, source="made")).discover(read_model("linear"), catalogue())
+    assert set(found.causes) == {"saturation", "base-tilt"}
+    assert "stage-zero-offset" in found.alternatives["base-tilt"]
+    assert found.end.held_out_excess < 1.15
+
+
+def test_a_scale_factor_over_the_other_axis_keeps_its_name_beside_a_curve_of_products() -> None:
+    directions = in_all_directions(200, seed=7)
+    x, y, z = forces(directions).T
+    own, other = np.column_stack([x, y]), np.column_stack([y, x])
+    over_cross, over_z = 2e-3 * np.sin(1.8 * other) * [1.0, -0.7], 1e-3 * np.tanh(2 * z)[:, None] * [1.0, 0.6]
+    found = discover(directions, own * (1 + over_cross + over_z))
+    assert found.causes == ("cross-axis-scale",)
+    assert found.end.held_out_excess < 1.15
+
+
+@pytest.mark.parametrize("seed", [3, *slow(range(6, 12))])
+def test_no_effect_is_named_where_noise_hides_every_step_of_a_converter(seed: int) -> None:
+    directions = in_all_directions(300, seed=4)
+    table = synthetic.poses(directions, *(2.5 + forces(directions)[:, :2]).T, noise_v=0.02, seed=seed)
+    assert catalogue()["quantisation"].searched(table) == 1.0
+    assert not dataset(table).discover(read_model("linear"), catalogue()).causes
 
 
 @pytest.mark.parametrize("columns", [in_all_directions(300, seed=4), *slow([swings_of_the_arm()])])

@@ -60,7 +60,7 @@ class Quantisation(Effect):
 
     def searched(self, table: Table) -> float:
         """The number of different steps of which the start is the best."""
-        return len(_frequencies(table)) / FINEST
+        return max(len(_frequencies(table)) / FINEST, 1.0)
 
     def output(self, v: Array, table: Table, p: Values) -> Array:
         rounded = v.copy()
