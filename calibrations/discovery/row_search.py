@@ -7,7 +7,7 @@ greatest effect is a misalignment, no effect is a refinement.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -169,7 +169,7 @@ class RowSearch:
             report("adding effects of the catalogue one after another")
             path = continue_path(path, effects)
         if structural.steps and path.steps and _cross_validated(path.end) <= _cross_validated(structural.end):
-            return self._path_findings(path, effects, origin)  # the larger model must predict better
+            return self._path_findings(path, effects, origin, structural.causes)  # the larger model must predict better
         origin = structural.start if origin is start else origin.in_floor(structural.end.noise.floor)
         findings = self._structural_findings(structural, outliers, origin)
         if not (findings.steps or path.steps) and structure_of(path.end) is None:
@@ -204,14 +204,18 @@ class RowSearch:
         """
         return self.table.type.stage_angles and self.table.n >= FEWEST_FOR_PLACES and not self.table.noise
 
-    def _path_findings(self, path: Path, effects: Mapping[str, Effect], origin: Fit) -> Findings[Fit]:
+    def _path_findings(
+        self, path: Path, effects: Mapping[str, Effect], origin: Fit, acting: Collection[str] = ()
+    ) -> Findings[Fit]:
+        """The findings of a search that adds effects; `acting`: causes of a search for places, which confirms them."""
         final = final_model(path, effects)
         path, final = in_final_floor(path, final.end), replace(final, end=final.end.in_floor(final.end.noise.scatter))
         if (reason := rejection(final.end)) is not None:
             return self.rejected(path.start, reason)
         pattern = find_competing_pattern(path.start, final.end)
         steps = _order_steps(path.start, final, effects)
-        causes = _causes(steps, len(path.first))
+        needed = _causes(steps, len(path.first))
+        causes = tuple(step.name for step in steps if step.name in needed or step.name in acting)
         inseparable = {
             name: final.effect_candidates[name].indistinguishable_from
             for name in causes

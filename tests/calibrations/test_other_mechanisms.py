@@ -9,9 +9,11 @@ import pytest
 
 from calibrations.discovery.results import Discovery
 from calibrations.effects.catalogue import catalogue
+from calibrations.effects.signal.quantisation import mean_of_rounded
 from calibrations.fitting.fit import Fit
 from calibrations.free_forms.acting_places import ActingPlace, places
 from calibrations.free_forms.chain import ModelEffects, start
+from calibrations.free_forms.place_names import PREFIX
 from calibrations.free_forms.places import components
 from calibrations.free_forms.poses import PoseData
 from calibrations.free_forms.search_result import Point, Setting, finish
@@ -165,18 +167,21 @@ def test_two_slopes_about_the_own_zero_leave_no_curve_in_swings_of_the_arm() -> 
 
 
 @pytest.mark.slow
-def test_a_saturation_that_bends_softly_has_its_name_beside_an_offset_of_the_stage() -> None:
+@pytest.mark.parametrize(
+    ("columns", "offset"),
+    [(in_all_directions(300, seed=4), "base-tilt"), (swings_of_the_arm(), "stage-zero-offset")],
+)
+def test_a_saturation_that_bends_softly_has_its_name_beside_an_offset(columns: dict[str, Array], offset: str) -> None:
     """Its bend is six times as wide as that of a hard one; curves of response and output would cancel each other."""
-    directions = in_all_directions(300, seed=4)
-    force = forces(directions, alpha_deg=0.14)
+    force, n = forces(columns, alpha_deg=0.14), len(columns["t_s"])
     output = force - 0.024 * np.sign(force) * np.logaddexp(0, (np.abs(force) - 1.0) / 0.03)
     noise = synthetic.NOISE_V * np.random.default_rng(0).standard_normal(output.shape)
     measured = {f"v{axis}_v": values for axis, values in zip("xyz", (2.5 + output + noise).T, strict=True)}
-    known = dict.fromkeys(["vx_std_v", "vy_std_v", "vz_std_v"], np.full(300, synthetic.NOISE_V * np.sqrt(5000.0)))
-    columns = {**directions, **measured, **known, "n": np.full(300, 5000.0)}
-    found = dataset(Table.from_columns("poses", columns, source="made")).discover(read_model("linear"), catalogue())
-    assert set(found.causes) == {"saturation", "base-tilt"}
-    assert "stage-zero-offset" in found.alternatives["base-tilt"]
+    known = dict.fromkeys(["vx_std_v", "vy_std_v", "vz_std_v"], np.full(n, synthetic.NOISE_V * np.sqrt(5000.0)))
+    table = Table.from_columns("poses", {**columns, **measured, **known, "n": np.full(n, 5000.0)}, source="made")
+    found = dataset(table).discover(read_model("linear"), catalogue())
+    assert set(found.causes) == {"saturation", offset}
+    assert {step.name for step in found.steps if not step.name.startswith(PREFIX)} == set(found.causes)
     assert found.end.held_out_excess < 1.15
 
 
@@ -187,6 +192,19 @@ def test_a_scale_factor_over_the_other_axis_keeps_its_name_beside_a_curve_of_pro
     over_cross, over_z = 2e-3 * np.sin(1.8 * other) * [1.0, -0.7], 1e-3 * np.tanh(2 * z)[:, None] * [1.0, 0.6]
     found = discover(directions, own * (1 + over_cross + over_z))
     assert found.causes == ("cross-axis-scale",)
+    assert found.end.held_out_excess < 1.15
+
+
+@pytest.mark.slow
+def test_effects_before_a_converter_are_added_one_by_one_where_places_leave_more_than_noise() -> None:
+    columns = swings_of_the_arm()
+    x, y, _ = forces(columns).T
+    own, other = np.column_stack([x, y]), np.column_stack([y, x])
+    smooth = 2.5 + own + 4e-4 * (own**2 + 0.6 * own**4) * [1.0, -0.8] + 2e-4 * own * np.sin(1.8 * other)
+    noise = synthetic.NOISE_V * np.sqrt(5000.0)
+    outputs = np.column_stack([mean_of_rounded(v, 3.6 * noise, 0.0, noise) for v in smooth.T])
+    found = dataset(synthetic.poses(columns, *outputs.T)).discover(read_model("linear"), catalogue())
+    assert set(found.causes) == {"quantisation", "quadratic-nonlinearity"}
     assert found.end.held_out_excess < 1.15
 
 
