@@ -216,6 +216,17 @@ def test_no_effect_is_named_where_noise_hides_every_step_of_a_converter(seed: in
     assert not dataset(table).discover(read_model("linear"), catalogue()).causes
 
 
+def test_a_converter_whose_samples_never_scatter_has_its_name() -> None:
+    columns = swings_of_the_arm()
+    outputs = np.round((2.5 + forces(columns)[:, :2]) / 5e-3) * 5e-3
+    table = synthetic.poses(columns, *outputs.T, seed=None)
+    without_scatter = dict.fromkeys(["vx_std_v", "vy_std_v"], np.zeros(table.n))
+    found = dataset(replace(table, columns={**table.columns, **without_scatter})).discover(
+        read_model("linear"), catalogue()
+    )
+    assert found.causes == ("quantisation",)
+
+
 @pytest.mark.parametrize("columns", [in_all_directions(300, seed=4), *slow([swings_of_the_arm()])])
 def test_a_wave_in_the_response_is_no_quantisation_of_noisier_samples_than_measured(columns: dict[str, Array]) -> None:
     """Only noise of half a step smooths a saw to a sine."""

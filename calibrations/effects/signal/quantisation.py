@@ -96,14 +96,14 @@ def _frequencies(table: Table) -> Array:
 
 
 def _scatter(table: Table) -> float:
-    """Standard deviation of a sample of the noisiest output, {out}; inf where the table does not say.
+    """Standard deviation of a sample of the noisiest output, {out}; inf where the table does not say, or says 0.
 
     On average over all values, rounded samples scatter more than they did before.
     """
     if not all(name in table for name in (*table.std_names, "n")) or np.all(table.column("n") < 2):
         return np.inf
     squares = [np.mean(table.column(name) ** 2) for name in table.std_names]
-    return float(np.sqrt(max(squares)))
+    return float(np.sqrt(max(squares))) or np.inf
 
 
 def _start(table: Table, k: int) -> Array:
