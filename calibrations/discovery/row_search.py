@@ -59,6 +59,7 @@ SCATTER_IS_NOISE = (
     "The noise floor is the scatter of the poses. It is larger than the standard deviation and the number of samples "
     "of a mean say, as if the samples were correlated."
 )
+CLEARLY_WORSE = 1.1  # times the error by cross-validation of a model that predicts better
 ONE_ORIENTATION = (
     "all rows have one orientation, which shows the bias, and not the scale factor, the geometry or any other response "
     "to the specific force; to calibrate these, measure at several inclinations and turns, as `rig run sweep` does"
@@ -165,11 +166,13 @@ class RowSearch:
         from calibrations.discovery.structural import search_structure  # only this search needs it
 
         structural = search_structure(start, effects, path.ranked if start.noise.known else ())
+        if structural.steps and path.steps and _cross_validated(path.end) <= _cross_validated(structural.end):
+            return self._path_findings(path, effects, origin)  # the larger model must predict better
         if structural.end.held_out_excess > MATERIAL:
             report("adding effects of the catalogue one after another")
-            path = continue_path(path, effects)
-        if structural.steps and path.steps and _cross_validated(path.end) <= _cross_validated(structural.end):
-            return self._path_findings(path, effects, origin, structural.causes)  # the larger model must predict better
+            further = continue_path(path, effects)
+            if CLEARLY_WORSE * _cross_validated(further.end) < _cross_validated(structural.end):
+                return self._path_findings(further, effects, origin, structural.causes)
         origin = structural.start if origin is start else origin.in_floor(structural.end.noise.floor)
         findings = self._structural_findings(structural, outliers, origin)
         if not (findings.steps or path.steps) and structure_of(path.end) is None:

@@ -73,7 +73,6 @@ def test_an_insignificant_cause_is_left_out_where_a_later_one_describes_its_part
 
 
 def test_a_curve_is_left_out_without_which_unseen_poses_are_foreseen_better(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And it is left out first: with it, a saturation would not seem to lower the unseen error."""
     added = [addition("quantisation"), addition("saturation"), Addition(free_form((CURVE,)))]
     held_out = (9.0, 4.0, 2.0, 4.0)
     fits = [SimpleNamespace(pooled_excess=1.0, held_out_excess=e) for e in held_out]
@@ -84,7 +83,9 @@ def test_a_curve_is_left_out_without_which_unseen_poses_are_foreseen_better(monk
 
     monkeypatch.setattr(structural, "fit_together", together)
     monkeypatch.setattr(structural, "fit_successively", lambda base, end, additions: [end for _ in additions])
-    assert structural._without_idle_additions(added, fits, [], [])[0] == added[:2]
+    selected, remaining_fits = structural._without_raising_forms(added, fits)
+    assert selected == added[:2]
+    assert remaining_fits[-1].held_out_excess == 2.0
 
 
 def test_beside_steps_a_cause_stays_while_the_curve_of_its_place_does(monkeypatch: pytest.MonkeyPatch) -> None:
