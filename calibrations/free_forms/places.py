@@ -40,8 +40,9 @@ LOOP_INTERVALS = 8
 DEAD_G = (0.003, 0.012, 0.05)
 THRESHOLDS_G = tuple(np.geomspace(0.002, 0.2, 8).tolist())  # of dead zones that are not all of one width
 OFF_CENTRE_G = 0.02  # a sensor's own zero, about which its dead zone may lie
-KNEES_G = (0.005, 0.03)  # widths of the bend where the search for it starts
-ENDS = (0.75, 0.9, 0.97, 0.99)  # of an axis's range, where saturation begins
+KNEE_G = 0.005  # width of a hard bend where the search for it starts
+# Where saturation begins, as a part of the range, and the width of its bend, g: a soft one shows at the end alone.
+BENDS = ((0.75, KNEE_G), (0.9, KNEE_G), (0.97, KNEE_G), (0.99, KNEE_G), (0.97, 0.03), (0.99, 0.03))
 DEGREE = 4  # of a general function of the force's direction
 FEWEST_ANGLES, FINE_ANGLES = 8, 33  # different angles beta that can show harmonics, and fine ones
 FEWEST_HEADINGS = 6  # the same for a few harmonics
@@ -185,18 +186,18 @@ def _clipped(widths: tuple[float, ...], centres: tuple[float, ...]) -> Basis:
 def _saturations(data: PoseData, first: State) -> list[Component]:
     place = "own-response"
     ranges = [(float(f.min() + f.max()) / 2, float(np.ptp(f)) / 2) for f in first.force.T]
-    price = 2 * np.log(3 * len(ENDS) * len(KNEES_G))
+    price = 2 * np.log(3 * len(BENDS))
 
     def make_saturation(name: str, side: int) -> Make:
         return lambda shape: Component(
             name, place, "response", "saturation", f"{place}/saturation", price, _saturation_columns(shape, side),
-            shape=shape, step=(*(0.02,) * (len(shape) - 1), KNEES_G[0]), reshaped=make_saturation(name, side),
+            shape=shape, step=(*(0.02,) * (len(shape) - 1), KNEE_G), reshaped=make_saturation(name, side),
             starts=lambda loss: (*_levels(first, shape, side), ("loss", "", float(np.clip(-loss[0], 0.01, 1.0)))),
         )  # fmt: skip
 
     components = []
     for side, name in ((1, "high"), (-1, "low"), (0, "both")):
-        for end, knee in product(ENDS, KNEES_G):
+        for end, knee in BENDS:
             levels = [(m + end * h, m - end * h) for m, h in ranges[: data.channels]]
             shape = tuple(
                 level
