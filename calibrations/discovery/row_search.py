@@ -59,7 +59,7 @@ SCATTER_IS_NOISE = (
     "The noise floor is the scatter of the poses. It is larger than the standard deviation and the number of samples "
     "of a mean say, as if the samples were correlated."
 )
-CLEARLY_WORSE = 1.1  # times the error by cross-validation of a model that predicts better
+CLEARLY_WORSE = 1.5  # times the error of a model by effects alone, whose names are less reliable
 ONE_ORIENTATION = (
     "all rows have one orientation, which shows the bias, and not the scale factor, the geometry or any other response "
     "to the specific force; to calibrate these, measure at several inclinations and turns, as `rig run sweep` does"
