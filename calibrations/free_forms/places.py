@@ -126,22 +126,12 @@ def _response_components(data: PoseData, first: State) -> list[Component]:
         form("quadratic-nonlinearity", lambda s, k: s.force[:, k, None] ** 2),
         form("cubic-nonlinearity", lambda s, k: s.force[:, k, None] ** 3),
         form("odd-quadratic-nonlinearity", lambda s, k: (s.force[:, k] * np.abs(s.force[:, k]))[:, None]),
-        _asymmetry((0.0,) * data.channels),
+        form("scale-factor-asymmetry", lambda s, k: np.abs(s.force[:, k, None])),
         free(Form(place, "curve", "own", _splines_over(first.force, data.channels, 22)), first),
     ]
     components += _dead_zones(data)
     components.append(free(Form(place, "thresholds", "own", (Clips(THRESHOLDS_G),)), first, "dead-zone", PRODUCT))
     return components + _saturations(data, first)
-
-
-def _asymmetry(zeros: tuple[float, ...]) -> Component:
-    """Two slopes that meet at the own zero of each channel, g."""
-    place, cause = "own-response", "scale-factor-asymmetry"
-    columns = per_axis(lambda s, k: np.abs(s.force[:, k, None] - zeros[k]))
-    return Component(
-        f"{place}/{cause}", place, "response", cause, columns=columns,
-        shape=zeros, step=(OFF_CENTRE_G / 2,) * len(zeros), reshaped=_asymmetry,
-    )  # fmt: skip
 
 
 def _dead_zones(data: PoseData) -> list[Component]:
